@@ -1,0 +1,351 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! `voidage couple`: the exchanges of a run, in their order.
+//!
+//! Reads MESH, FIELDS (CFD) and PARTICLES (DEM); writes SOURCES (CFD), DRIVE (DEM), a row of the monitor per
+//! exchange. The DEM leads by one period: exchange 0 needs no fluid step. Does not know shared memory
+//! (generic over `Transport`), nor how a stage works.
+
+use crate::balance::Books;
+use crate::mesh::{self, Mesh, MeshPiece};
+use crate::monitor::{Monitor, Row};
+use crate::particles::{ParticleError, Particles};
+use crate::partners::{PartnerError, Partners};
+use crate::step::{CouplingStep, Fluid, StepError};
+use crate::sums::norm;
+use std::time::{Duration, Instant};
+use thiserror::Error;
+use voidage_wire::{Block, Frame, Transport, WireError, field, frame, kind};
+
+/// Why a run ended before its time.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum CoupleError {
+    /// A partner.
+    #[error(transparent)]
+    Partner(#[from] PartnerError),
+    /// A particle.
+    #[error("exchange {step}: {source}")]
+    Particle {
+        /// exchange number
+        step: i64,
+        /// what
+        source: ParticleError,
+    },
+    /// A stage.
+    #[error("exchange {step}: {source}")]
+    Step {
+        /// exchange number
+        step: i64,
+        /// what
+        source: StepError,
+    },
+    /// A message.
+    #[error("message: {0}")]
+    Wire(#[from] WireError),
+    /// The mesh.
+    #[error("the mesh of the CFD: {0}")]
+    Mesh(#[from] mesh::MeshError),
+    /// Partners disagree.
+    #[error("{0}")]
+    OutOfStep(String),
+    /// A file.
+    #[error("{what}: {source}")]
+    File {
+        /// which
+        what: &'static str,
+        /// why
+        source: std::io::Error,
+    },
+}
+
+/// What a run came to.
+#[derive(Clone, Copy, Debug, Default)]
+#[allow(missing_docs)]
+pub struct Summary {
+    pub steps: i64,
+    pub time: f64,
+    pub coupler: f64,
+    pub wait_dem: f64,
+    pub wait_cfd: f64,
+    pub worst_action_reaction: f64,
+    pub worst_solid_volume: f64,
+    pub redone: u64,
+    pub excluded: u64,
+    pub ledger_left: f64,
+}
+
+/// Receives the mesh of all CFD ranks.
+pub fn receive_mesh<T: Transport>(partners: &mut Partners<T>) -> Result<Mesh, CoupleError> {
+    let mut pieces = Vec::new();
+    for (rank, i) in partners.cfd().enumerate() {
+        let sample = partners.receive(i, kind::MESH, "mesh")?;
+        pieces.push(MeshPiece::from_frame(rank, &Frame::parse(&sample)?)?);
+    }
+    Ok(mesh::assemble(&pieces)?)
+}
+
+/// What a write time hands to the output.
+pub struct Snapshot<'a> {
+    /// exchange number
+    pub k: i64,
+    /// fluid time, s
+    pub time: f64,
+    /// particles of this exchange
+    pub particles: &'a Particles,
+    /// the stages' fields
+    pub step: &'a CouplingStep,
+    /// the fluid at the end of the step
+    pub fluid: &'a Fluid,
+}
+
+/// A run under way.
+pub struct Exchange<'a, T: Transport> {
+    /// The connected programs.
+    pub partners: Partners<T>,
+    /// The stages.
+    pub step: CouplingStep,
+    /// False: the fluid does not feel the particles.
+    pub two_way: bool,
+    /// Δt, s.
+    pub period: f64,
+    /// Fluid time at exchange 0, s.
+    pub start: f64,
+    /// monitor.csv
+    pub monitor: Monitor,
+    /// Told after each exchange.
+    pub progress: &'a mut dyn FnMut(&Row, &Summary),
+    /// Told at the fluid's write times.
+    pub write: &'a mut dyn FnMut(&Snapshot) -> std::io::Result<()>,
+}
+
+/// A row that waits for the DEM's report on the interval it is about.
+struct Open {
+    row: Row,
+    books: Books,
+}
+
+impl<T: Transport> Exchange<'_, T> {
+    /// Runs until the fluid's last step; partners are told to stop in either case.
+    pub fn run(&mut self) -> Result<Summary, CoupleError> {
+        let result = self.exchanges();
+        if let Err(e) = &result {
+            self.partners.stop(&e.to_string());
+        }
+        result
+    }
+
+    fn exchanges(&mut self) -> Result<Summary, CoupleError> {
+        let mut summary = Summary::default();
+        let mut fluid = Fluid::default();
+        let mut open: Option<Open> = None;
+        let mut left = [0.0; 3];
+        for k in 0.. {
+            let begin = Instant::now();
+            let time = self.start + k as f64 * self.period;
+            let (first, mut wait_cfd, mut last, mut write) = (k == 0, Duration::ZERO, false, true);
+            let mut reaction = [0.0; 3];
+            if first {
+                (last, _, _) = self.receive_fluid(k, &mut fluid, &mut wait_cfd)?;
+            }
+            let waiting = Instant::now();
+            let mut particles = self.receive_particles(k)?;
+            let wait_dem = waiting.elapsed();
+            if let Some(o) = open.take() {
+                self.close(o, Some(&particles), &mut left, &mut summary)?;
+            }
+            let stage = |source| CoupleError::Step { step: k, source };
+            self.step.before_fluid(&mut particles, first).map_err(stage)?;
+            self.send_sources(k, time)?;
+            if !first {
+                (last, write, reaction) = self.receive_fluid(k, &mut fluid, &mut wait_cfd)?;
+            }
+            self.step.after_fluid(&particles, &fluid, first).map_err(stage)?;
+            self.step.books.reaction = reaction;
+            if last {
+                self.partners.stop("");
+            } else {
+                self.send_drive(k, time, &particles)?;
+            }
+            if write {
+                let snapshot = Snapshot { k, time, particles: &particles, step: &self.step, fluid: &fluid };
+                (self.write)(&snapshot).map_err(|source| CoupleError::File { what: "write fields", source })?;
+            }
+            let mut o = self.open_row(k, time, &particles, &mut summary);
+            o.row.wait_dem = wait_dem.as_secs_f64();
+            o.row.wait_cfd = wait_cfd.as_secs_f64();
+            o.row.coupler = begin.elapsed().as_secs_f64() - o.row.wait_dem - o.row.wait_cfd;
+            summary.coupler += o.row.coupler;
+            summary.wait_dem += o.row.wait_dem;
+            summary.wait_cfd += o.row.wait_cfd;
+            summary.steps = k;
+            summary.time = time;
+            (self.progress)(&o.row, &summary);
+            if last {
+                self.close(o, None, &mut left, &mut summary)?;
+                return Ok(summary);
+            }
+            open = Some(o);
+        }
+        Ok(summary)
+    }
+
+    fn in_step(got: i64, due: i64, who: &str) -> Result<(), CoupleError> {
+        if got == due {
+            return Ok(());
+        }
+        Err(CoupleError::OutOfStep(format!("{who} is at exchange {got}, {due} is due: fluid and DEM are out of step")))
+    }
+
+    fn receive_particles(&mut self, k: i64) -> Result<Particles, CoupleError> {
+        let mut samples = Vec::new();
+        for i in self.partners.dem() {
+            samples.push(self.partners.receive(i, kind::PARTICLES, "particles")?);
+        }
+        let frames = samples.iter().map(|s| Frame::parse(s)).collect::<Result<Vec<_>, _>>()?;
+        for (i, f) in frames.iter().enumerate() {
+            Self::in_step(f.step(), k, &self.partners.who(i))?;
+        }
+        Particles::receive(&frames).map_err(|source| CoupleError::Particle { step: k, source })
+    }
+
+    /// The fluid of all CFD ranks by cell slot; (last step, write time, Σ reaction in N s).
+    fn receive_fluid(
+        &mut self,
+        k: i64,
+        fluid: &mut Fluid,
+        waited: &mut Duration,
+    ) -> Result<(bool, bool, [f64; 3]), CoupleError> {
+        let n = self.step.mesh.ids.len();
+        let (mut flags, mut reaction) = ([0.0; 2], [0.0; 3]);
+        for (piece, i) in self.partners.cfd().enumerate() {
+            let begin = Instant::now();
+            let sample = self.partners.receive(i, kind::FIELDS, "fields")?;
+            *waited += begin.elapsed();
+            let frame = Frame::parse(&sample)?;
+            Self::in_step(frame.step(), k, &self.partners.who(i))?;
+            let slots = &self.step.mesh.slots[piece];
+            for (name, to) in [
+                (field::FLUID_VELOCITY, &mut fluid.velocity),
+                (field::PRESSURE_GRADIENT, &mut fluid.pressure_gradient),
+                (field::STRESS_DIVERGENCE, &mut fluid.stress_divergence),
+            ] {
+                if name != field::FLUID_VELOCITY && frame.raw(name).is_none() {
+                    continue;
+                }
+                to.resize(n, [0.0; 3]);
+                let values = frame.vectors_of(name, slots.len())?;
+                slots.iter().zip(values).for_each(|(slot, v)| to[*slot as usize] = *v);
+            }
+            let (f, r) = (frame.f64s_of(field::FLAGS, 2)?, frame.f64s_of(field::REACTION, 3)?);
+            flags = [f[0], f[1]];
+            (0..3).for_each(|a| reaction[a] += r[a]);
+        }
+        Ok((flags[0] != 0.0, flags[1] != 0.0, reaction))
+    }
+
+    fn send_sources(&mut self, k: i64, time: f64) -> Result<(), CoupleError> {
+        for (piece, i) in self.partners.cfd().enumerate() {
+            let (slots, s) = (&self.step.mesh.slots[piece], &self.step.sources);
+            let n = slots.len();
+            let scalars = [(field::VOIDAGE, &s.voidage), (field::VOIDAGE_OLD, &s.voidage_old), (field::SP, &s.sp)];
+            let vectors = [(field::SOLIDS_FLUX, &s.solids_flux), (field::SU, &s.su)];
+            let mut blocks: Vec<_> = scalars.iter().map(|f| Block::f64s(f.0, n)).collect();
+            blocks.extend(vectors.iter().map(|f| Block::f64s(f.0, 3 * n)));
+            let two_way = self.two_way;
+            self.partners.send(i, kind::SOURCES, k, time, &blocks, |words| {
+                for (name, from) in scalars {
+                    let Some(to) = frame::f64s_mut(words, name) else { continue };
+                    if two_way {
+                        to.iter_mut().zip(slots).for_each(|(t, slot)| *t = from[*slot as usize]);
+                    } else {
+                        to.fill(if name == field::SP { 0.0 } else { 1.0 });
+                    }
+                }
+                for (name, from) in vectors {
+                    let Some(to) = frame::f64s_mut(words, name) else { continue };
+                    if two_way {
+                        let cells = to.chunks_exact_mut(3).zip(slots);
+                        cells.for_each(|(t, slot)| t.copy_from_slice(&from[*slot as usize]));
+                    }
+                }
+            })?;
+        }
+        Ok(())
+    }
+
+    fn send_drive(&mut self, k: i64, time: f64, particles: &Particles) -> Result<(), CoupleError> {
+        let mut counts = vec![0; self.partners.dem().len()];
+        particles.origin.iter().for_each(|o| counts[o.0 as usize] += 1);
+        let drive = &self.step.drive;
+        for i in self.partners.dem() {
+            let n = counts[i];
+            let vectors = [
+                (field::DRIVE_VELOCITY, &drive.velocity),
+                (field::FORCE, &drive.force),
+                (field::CHARGED, &drive.charged),
+            ];
+            let mut blocks = vec![Block::f64s(field::DRAG_COEFFICIENT, n)];
+            blocks.extend(vectors.iter().map(|f| Block::f64s(f.0, 3 * n)));
+            let own = || particles.origin.iter().enumerate().filter(|(_, o)| o.0 as usize == i);
+            self.partners.send(i, kind::DRIVE, k, time, &blocks, |words| {
+                if let Some(to) = frame::f64s_mut(words, field::DRAG_COEFFICIENT) {
+                    own().for_each(|(p, o)| to[o.1 as usize] = drive.drag_coefficient[p]);
+                }
+                for (name, from) in vectors {
+                    let Some(to) = frame::f64s_mut(words, name) else { continue };
+                    own().for_each(|(p, o)| to[3 * o.1 as usize..][..3].copy_from_slice(&from[p]));
+                }
+            })?;
+        }
+        Ok(())
+    }
+
+    fn open_row(&self, k: i64, time: f64, particles: &Particles, summary: &mut Summary) -> Open {
+        let (facts, books) = (&self.step.facts, self.step.books);
+        summary.redone += facts.positive_redone;
+        summary.excluded += facts.excluded;
+        summary.worst_solid_volume = summary.worst_solid_volume.max(facts.solid_volume_error);
+        let row = Row {
+            step: k,
+            time,
+            particles: particles.len(),
+            solid_fraction_max: facts.solid_fraction_max,
+            solid_volume_error: facts.solid_volume_error,
+            solid_momentum_error: facts.solid_momentum_error,
+            action_reaction_error: self.two_way.then(|| books.error(None)),
+            ledger_momentum: norm(books.old_ledger),
+            positive_redone: summary.redone,
+            excluded: summary.excluded,
+            capped_volume: facts.capped_volume,
+            given: [0, 1, 2].map(|a| books.charged[a] + books.old_ledger[a] - books.external[a]),
+            ..Row::default()
+        };
+        Open { row, books }
+    }
+
+    /// Completes a row with what the DEM reports of the interval (`None`: the run is over).
+    fn close(
+        &mut self,
+        mut o: Open,
+        next: Option<&Particles>,
+        left: &mut [f64; 3],
+        summary: &mut Summary,
+    ) -> Result<(), CoupleError> {
+        if let Some(p) = next {
+            // action = impulse applied + change of the ledger; vanished particles' ledger goes to `left`
+            let alive = crate::sums::sum3(p.ledger.iter().copied());
+            let ledger = [0, 1, 2].map(|a| p.totals.taken[a] - p.totals.charged[a]);
+            let charged = [0, 1, 2].map(|a| p.totals.taken[a] - ledger[a]);
+            (0..3).for_each(|a| left[a] += ledger[a] - alive[a]);
+            if self.two_way {
+                o.row.action_reaction_error = Some(o.books.error(Some(charged)));
+            }
+            o.row.ledger_momentum = norm(alive);
+        }
+        o.row.ledger_left = norm(*left);
+        summary.ledger_left = o.row.ledger_left;
+        summary.worst_action_reaction =
+            summary.worst_action_reaction.max(o.row.action_reaction_error.unwrap_or_default());
+        self.monitor.write(&o.row).map_err(|source| CoupleError::File { what: "monitor.csv", source })
+    }
+}

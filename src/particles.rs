@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Stage 1, receive: particles of all DEM ranks, in the order of their ids.
+//!
+//! Reads PARTICLES frames (SI units); writes one table sorted by id, so that no later sum depends on how
+//! the DEM is split or in which order particles arrive. Does not know the mesh.
+
+use std::f64::consts::PI;
+use thiserror::Error;
+use voidage_wire::{Frame, WireError, field};
+
+/// All particles of one exchange, sorted by id.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Particles {
+    /// global id, ascending
+    pub id: Vec<i64>,
+    /// DEM rank and position in its message
+    pub origin: Vec<(u32, u32)>,
+    /// m
+    pub position: Vec<[f64; 3]>,
+    /// m/s
+    pub velocity: Vec<[f64; 3]>,
+    /// m
+    pub radius: Vec<f64>,
+    /// kg
+    pub mass: Vec<f64>,
+    /// N s, old ledger L: impulse taken but not yet charged to the fluid
+    pub ledger: Vec<[f64; 3]>,
+    /// N s, sums over all particles, those that vanished since included
+    pub totals: Totals,
+}
+
+/// Sums the DEM reports for the last interval, N s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Totals {
+    /// impulse taken from the fluid, J
+    pub taken: [f64; 3],
+    /// impulse charged to the fluid
+    pub charged: [f64; 3],
+}
+
+/// A particle that cannot be coupled.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ParticleError {
+    /// A number is wrong.
+    #[error("particle {id} (DEM rank {rank}): {what}; the DEM has gone wrong, look at its log and time step")]
+    Bad {
+        /// particle id
+        id: i64,
+        /// DEM rank
+        rank: usize,
+        /// which number
+        what: String,
+    },
+    /// Two particles with one id.
+    #[error("particle id {id} came twice, from DEM ranks {first} and {second}: ids must be unique")]
+    Duplicate {
+        /// particle id
+        id: i64,
+        /// rank
+        first: u32,
+        /// rank
+        second: u32,
+    },
+    /// A message is damaged.
+    #[error(transparent)]
+    Wire(#[from] WireError),
+}
+
+impl Particles {
+    /// Number of particles.
+    pub fn len(&self) -> usize {
+        self.id.len()
+    }
+    /// None at all.
+    pub fn is_empty(&self) -> bool {
+        self.id.is_empty()
+    }
+    /// Volume of a particle, m3.
+    pub fn volume(&self, i: usize) -> f64 {
+        let r = self.radius[i];
+        4.0 / 3.0 * PI * r * r * r
+    }
+
+    /// Merges the messages of all DEM ranks (in rank order).
+    pub fn receive(frames: &[Frame]) -> Result<Self, ParticleError> {
+        let ids = frames.iter().map(|f| f.i64s(field::ID)).collect::<Result<Vec<_>, _>>()?;
+        let mut order = Vec::with_capacity(ids.iter().map(|i| i.len()).sum());
+        for (rank, list) in ids.iter().enumerate() {
+            order.extend(list.iter().enumerate().map(|(k, id)| (*id, rank as u32, k as u32)));
+        }
+        if !order.is_sorted() {
+            order.sort_unstable();
+        }
+        if let Some(w) = order.windows(2).find(|w| w[0].0 == w[1].0) {
+            return Err(ParticleError::Duplicate { id: w[0].0, first: w[0].1, second: w[1].1 });
+        }
+        let vectors = |name: u32| -> Result<Vec<[f64; 3]>, WireError> {
+            let parts = frames.iter().zip(&ids).map(|(f, i)| f.vectors_of(name, i.len()));
+            let parts = parts.collect::<Result<Vec<_>, _>>()?;
+            Ok(order.iter().map(|o| parts[o.1 as usize][o.2 as usize]).collect())
+        };
+        let scalars = |name: u32| -> Result<Vec<f64>, WireError> {
+            let parts = frames.iter().zip(&ids).map(|(f, i)| f.f64s_of(name, i.len()));
+            let parts = parts.collect::<Result<Vec<_>, _>>()?;
+            Ok(order.iter().map(|o| parts[o.1 as usize][o.2 as usize]).collect())
+        };
+        let mut totals = Totals::default();
+        for f in frames {
+            let t = f.f64s_of(field::TOTALS, 9)?;
+            (0..3).for_each(|a| totals.taken[a] += t[a]);
+            (0..3).for_each(|a| totals.charged[a] += t[3 + a]);
+        }
+        let p = Self {
+            position: vectors(field::POSITION)?,
+            velocity: vectors(field::VELOCITY)?,
+            radius: scalars(field::RADIUS)?,
+            mass: scalars(field::MASS)?,
+            ledger: vectors(field::LEDGER)?,
+            id: order.iter().map(|o| o.0).collect(),
+            origin: order.iter().map(|o| (o.1, o.2)).collect(),
+            totals,
+        };
+        p.check()?;
+        Ok(p)
+    }
+
+    fn check(&self) -> Result<(), ParticleError> {
+        let finite = |v: &[f64; 3]| v.iter().all(|x| x.is_finite());
+        for i in 0..self.len() {
+            let what = match () {
+                () if !finite(&self.position[i]) => format!("position {:?}", self.position[i]),
+                () if !finite(&self.velocity[i]) => format!("velocity {:?}", self.velocity[i]),
+                () if !finite(&self.ledger[i]) => format!("ledger {:?}", self.ledger[i]),
+                () if !(self.radius[i] > 0.0 && self.radius[i].is_finite()) => format!("radius {}", self.radius[i]),
+                () if !(self.mass[i] > 0.0 && self.mass[i].is_finite()) => format!("mass {}", self.mass[i]),
+                () => continue,
+            };
+            return Err(ParticleError::Bad { id: self.id[i], rank: self.origin[i].0 as usize, what });
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use voidage_wire::{Block, frame, kind};
+
+    /// A PARTICLES frame of spheres (id, position), at rest, diameter 1 mm, density 1000 kg/m3.
+    pub(crate) fn message(list: &[(i64, [f64; 3])]) -> Vec<u64> {
+        let n = list.len();
+        let mut blocks = vec![Block::i64s(field::ID, n), Block::f64s(field::TOTALS, 9)];
+        blocks.extend([field::POSITION, field::VELOCITY, field::LEDGER].map(|f| Block::f64s(f, 3 * n)));
+        blocks.extend([field::RADIUS, field::MASS].map(|f| Block::f64s(f, n)));
+        let mut words = vec![0; frame::words(&blocks)];
+        frame::start(&mut words, kind::PARTICLES, 0, 0.0, &blocks);
+        for (i, (id, x)) in list.iter().enumerate() {
+            frame::array_mut(&mut words, field::ID).unwrap()[i] = *id as u64;
+            frame::f64s_mut(&mut words, field::POSITION).unwrap()[3 * i..][..3].copy_from_slice(x);
+            frame::f64s_mut(&mut words, field::RADIUS).unwrap()[i] = 5e-4;
+            frame::f64s_mut(&mut words, field::MASS).unwrap()[i] = 1000.0 * PI / 6.0 * 1e-9;
+        }
+        words
+    }
+
+    #[test]
+    fn the_table_does_not_depend_on_ranks_and_order() {
+        let all: Vec<_> = (0..50).map(|i| (i * 7 % 50, [i as f64, 0.5, 0.25])).collect();
+        let whole = message(&all);
+        let one = Particles::receive(&[Frame::parse(&whole).unwrap()]).unwrap();
+        let (a, b): (Vec<_>, Vec<_>) = all.iter().rev().partition(|p| p.0 % 3 == 0);
+        let (a, b) = (message(&a), message(&b));
+        let two = Particles::receive(&[Frame::parse(&a).unwrap(), Frame::parse(&b).unwrap()]).unwrap();
+        assert_eq!(Particles { origin: vec![], ..one }, Particles { origin: vec![], ..two });
+    }
+
+    #[test]
+    fn wrong_particles_are_named() {
+        let mut m = message(&[(3, [0.0; 3]), (9, [f64::NAN, 0.0, 0.0])]);
+        let e = Particles::receive(&[Frame::parse(&m).unwrap()]).unwrap_err().to_string();
+        assert!(e.starts_with("particle 9 (DEM rank 0): position [NaN"), "{e}");
+        frame::f64s_mut(&mut m, field::POSITION).unwrap()[3] = 0.0;
+        frame::f64s_mut(&mut m, field::RADIUS).unwrap()[0] = -1.0;
+        let e = Particles::receive(&[Frame::parse(&m).unwrap()]).unwrap_err().to_string();
+        assert!(e.contains("particle 3") && e.contains("radius -1"), "{e}");
+        let (a, b) = (message(&[(3, [0.0; 3])]), message(&[(3, [1.0; 3])]));
+        let e = Particles::receive(&[Frame::parse(&a).unwrap(), Frame::parse(&b).unwrap()]).unwrap_err();
+        assert!(e.to_string().contains("id 3 came twice, from DEM ranks 0 and 1"));
+    }
+}
