@@ -231,7 +231,7 @@ impl<T: Transport> Partners<T> {
     ) -> Result<(), PartnerError> {
         let who = self.who(i);
         let transport = &mut self.list[i].transport;
-        let mut work = || {
+        let work = || {
             let mut loan = transport.loan(frame::words(blocks))?;
             frame::start(&mut loan, kind, step, time, blocks);
             fill(&mut loan);
@@ -277,7 +277,8 @@ mod tests {
         let (own, dead) = (Process::own(), Process { pid: 1, started: 1 });
         let (mut p, _a, _b) = run(own, own);
         assert!(error(&mut p, 1).starts_with("CFD rank 0 sent no fields for 0"), "limit");
-        let (mut p, _a, _b) = run(dead, own);
+        let (mut p, _a, _b) = run(own, own);
+        p.list[0].hello.as_mut().unwrap().process = dead;
         let e = error(&mut p, 1);
         assert!(e.starts_with("DEM rank 0 (process 1) has died"), "{e}");
         let (mut p, mut a, _b) = run(own, own);

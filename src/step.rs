@@ -383,7 +383,9 @@ impl CouplingStep {
         for i in 0..n {
             if !self.coupled[i] {
                 d.drag_coefficient.push(0.0);
-                [&mut d.velocity, &mut d.force, &mut d.charged].map(|a| a.push([0.0; 3]));
+                for list in [&mut d.velocity, &mut d.force, &mut d.charged] {
+                    list.push([0.0; 3]);
+                }
                 external.push([0.0; 3]);
                 continue;
             }

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Stage 2, locate: the host cell of each particle.
+//!
+//! Reads positions (m) and where to look first; writes cell slots and positions brought back through cyclic
+//! faces. A point on a face belongs to the cell its normal points out of, so to exactly one. On meshes with
+//! plane faces the answer does not depend on the first guess; on warped faces the guess is not used.
+
+use crate::mesh::{Mesh, NONE};
+
+/// A particle without a host cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lost {
+    /// position in the list
+    pub index: usize,
+    /// m
+    pub position: [f64; 3],
+    /// boundary patch it left through, if known
+    pub near: Option<String>,
+}
+
+/// A coarse grid of first guesses, and a tolerance for boundaries.
+pub struct Locator {
+    lower: [f64; 3],
+    bin: [f64; 3],
+    bins: [usize; 3],
+    seed: Vec<u32>,
+    planar: bool,
+}
+
+/// Distance a point may lie outside a boundary face, relative to the cell size: rounding only.
+const BOUNDARY: f64 = 1e-10;
+
+enum Walk {
+    Found(u32),
+    Boundary(u32),
+    Failed,
+}
+
+impl Locator {
+    /// About one bin per cell.
+    pub fn new(mesh: &Mesh) -> Self {
+        let [lower, upper] = mesh.bounds;
+        let extent = [0, 1, 2].map(|a| (upper[a] - lower[a]).max(f64::MIN_POSITIVE));
+        let size = (extent.iter().product::<f64>() / mesh.len() as f64).cbrt();
+        let bins = extent.map(|e| ((e / size).round() as usize).clamp(1, 1000));
+        let bin = [0, 1, 2].map(|a| extent[a] / bins[a] as f64);
+        let mut l = Self { lower, bin, bins, seed: vec![NONE; bins.iter().product()], planar: planar(mesh) };
+        for (slot, c) in mesh.centre.iter().enumerate() {
+            let b = l.bin_of(*c);
+            if l.seed[b] == NONE {
+                l.seed[b] = slot as u32;
+            }
+        }
+        let mut last = 0;
+        for s in &mut l.seed {
+            if *s == NONE { *s = last } else { last = *s }
+        }
+        l
+    }
+
+    fn bin_of(&self, x: [f64; 3]) -> usize {
+        let i = [0, 1, 2].map(|a| (((x[a] - self.lower[a]) / self.bin[a]) as usize).min(self.bins[a] - 1));
+        (i[2] * self.bins[1] + i[1]) * self.bins[0] + i[0]
+    }
+
+    /// Finds all host cells. `host`: in: guesses or `NONE`; out: slots. Errors list every lost particle.
+    pub fn locate(&self, mesh: &Mesh, position: &mut [[f64; 3]], host: &mut [u32]) -> Result<(), Vec<Lost>> {
+        let mut lost = Vec::new();
+        for (index, (x, h)) in position.iter_mut().zip(host.iter_mut()).enumerate() {
+            let guess = if self.planar && *h != NONE { *h } else { self.seed[self.bin_of(*x)] };
+            let mut y = *x;
+            *h = match walk(mesh, guess, &mut y) {
+                Walk::Found(slot) => slot,
+                Walk::Boundary(patch) => match search(mesh, *x, &mut y) {
+                    Some(slot) => slot,
+                    None => {
+                        let near = mesh.patch_names.get(patch as usize).cloned();
+                        lost.push(Lost { index, position: *x, near });
+                        NONE
+                    }
+                },
+                Walk::Failed => search(mesh, *x, &mut y).unwrap_or_else(|| {
+                    lost.push(Lost { index, position: *x, near: None });
+                    NONE
+                }),
+            };
+            if *h != NONE {
+                *x = y;
+            }
+        }
+        if lost.is_empty() { Ok(()) } else { Err(lost) }
+    }
+}
+
+/// How far `x` lies beyond a side (> 0: outside), and whether it belongs to the cell across.
+fn beyond(side: &crate::mesh::Side, x: &[f64; 3]) -> (f64, bool) {
+    let n = &side.normal;
+    let s = (n[0] * x[0] + n[1] * x[1] + n[2] * x[2]) - side.offset;
+    // on the face (s = 0): inside the cell the normal leaves, outside the other; cyclic faces keep it inside
+    let leaves = if side.sign > 0.0 { s > 0.0 } else { s < 0.0 || (s == 0.0 && side.shift == [0.0; 3]) };
+    (side.sign * s, leaves)
+}
+
+fn walk(mesh: &Mesh, from: u32, x: &mut [f64; 3]) -> Walk {
+    let mut cell = from;
+    for _ in 0..1000 {
+        let tolerance = BOUNDARY * mesh.volume[cell as usize].cbrt();
+        let (mut inner, mut wall) = (None::<(f64, usize)>, None::<u32>);
+        for (i, side) in mesh.sides(cell as usize).iter().enumerate() {
+            let (distance, leaves) = beyond(side, x);
+            if side.across == NONE {
+                if distance > tolerance {
+                    wall = wall.or(Some(side.patch));
+                }
+            } else if leaves && inner.is_none_or(|b| distance > b.0) {
+                inner = Some((distance, i));
+            }
+        }
+        match (inner, wall) {
+            (Some((_, i)), _) => {
+                let side = mesh.sides(cell as usize)[i];
+                cell = side.across;
+                (0..3).for_each(|a| x[a] += side.shift[a]);
+            }
+            (None, Some(patch)) => return Walk::Boundary(patch),
+            (None, None) => return Walk::Found(cell),
+        }
+    }
+    Walk::Failed
+}
+
+/// The cell of lowest id that holds `x` or one of its periodic images, by looking at all cells.
+fn search(mesh: &Mesh, x: [f64; 3], y: &mut [f64; 3]) -> Option<u32> {
+    let slack = mesh.bounds[0].iter().zip(&mesh.bounds[1]).map(|(a, b)| b - a).fold(0.0, f64::max);
+    if (0..3).any(|a| !(mesh.bounds[0][a] - slack..=mesh.bounds[1][a] + slack).contains(&x[a])) {
+        return None;
+    }
+    for cell in 0..mesh.len() {
+        let size = mesh.volume[cell].cbrt();
+        let tolerance = BOUNDARY * size;
+        let inside = mesh.sides(cell).iter().all(|s| {
+            let (distance, leaves) = beyond(s, &x);
+            if s.across == NONE { distance <= tolerance } else { !leaves }
+        });
+        if inside {
+            *y = x;
+            return Some(cell as u32);
+        }
+    }
+    None
+}
+
+/// All faces flat to rounding? Then cells are convex cuts and the walk's end is unique.
+fn planar(mesh: &Mesh) -> bool {
+    mesh.faces.of_cell.iter().enumerate().all(|(slot, faces)| {
+        let tolerance = 1e-9 * mesh.volume[slot].cbrt();
+        faces.iter().all(|face| {
+            let p: Vec<_> = face.iter().map(|i| mesh.faces.points[*i as usize]).collect();
+            let on = |s: &crate::mesh::Side, x: &[f64; 3]| {
+                (s.normal[0] * x[0] + s.normal[1] * x[1] + s.normal[2] * x[2] - s.offset).abs() <= tolerance
+            };
+            mesh.sides(slot).iter().any(|s| p.iter().all(|x| on(s, x)))
+        })
+    })
+}
