@@ -134,7 +134,7 @@ impl DragLaw for KochHill {
             10.0 * phi / e.powi(3)
         };
         let f3 = 0.0673 + 0.212 * phi + 0.0232 / e.powi(5);
-        s.stokes() * e * (f0 + 0.5 * f3 * e * s.reynolds())
+        s.stokes() * e * e * (f0 + 0.5 * f3 * e * s.reynolds())
     }
 }
 
