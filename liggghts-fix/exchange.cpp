@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The exchange with the coupler: open, send the owned particles, receive what drives them. Copies only.
+
+#include "fix_voidage.h"
+
+#include "atom.h"
+#include "comm.h"
+#include "error.h"
+#include "update.h"
+
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <string>
+
+using namespace LAMMPS_NS;
+
+namespace LAMMPS_NS { namespace SignalHandler { extern bool request_quit; } }
+
+// Ends this program on all ranks with a message; the coupler is told why.
+void FixVoidage::stop(const char *text)
+{
+  std::string message = std::string("fix voidage: ") + text;
+  if (link_) voidage_fail(link_, text);
+  error->one(FLERR, message.c_str());
+}
+
+double FixVoidage::setting(const char *name)
+{
+  double value = 0.0;
+  if (voidage_setting(link_, name, &value) != 0) stop(voidage_last_error());
+  return value;
+}
+
+void FixVoidage::open()
+{
+  link_ = voidage_open(VOIDAGE_DEM, comm->me, comm->nprocs, update->dt, update->ntimestep,
+                       update->ntimestep * update->dt, "LIGGGHTS 3.8.0");
+  if (!link_) stop(voidage_last_error());
+  interval_ = (int)setting("coupling.interval");
+  explicit_limit_ = setting("dem.explicit_limit");
+  constant_force_ = setting("dem.constant_force") != 0.0;
+  check_settings();
+}
+
+void FixVoidage::exchange()
+{
+  send();
+  receive();
+}
+
+void FixVoidage::send()
+{
+  const uint64_t n = atom->nlocal;
+  const voidage_block blocks[] = {
+    {VOIDAGE_ID, VOIDAGE_I64, n}, {VOIDAGE_TYPE, VOIDAGE_I64, n}, {VOIDAGE_POSITION, VOIDAGE_F64, 3 * n},
+    {VOIDAGE_VELOCITY, VOIDAGE_F64, 3 * n}, {VOIDAGE_RADIUS, VOIDAGE_F64, n}, {VOIDAGE_MASS, VOIDAGE_F64, n},
+    {VOIDAGE_ANGULAR_VELOCITY, VOIDAGE_F64, 3 * n}, {VOIDAGE_IMPULSE, VOIDAGE_F64, 3 * n},
+    {VOIDAGE_LEDGER, VOIDAGE_F64, 3 * n}, {VOIDAGE_TOTALS, VOIDAGE_F64, 9}};
+  if (voidage_begin(link_, VOIDAGE_PARTICLES, exchange_, update->ntimestep * update->dt, blocks,
+                    sizeof blocks / sizeof *blocks))
+    stop(voidage_last_error());
+  int64_t *id = (int64_t *)voidage_array(link_, VOIDAGE_ID), *type = (int64_t *)voidage_array(link_, VOIDAGE_TYPE);
+  double *x = (double *)voidage_array(link_, VOIDAGE_POSITION), *v = (double *)voidage_array(link_, VOIDAGE_VELOCITY);
+  double *r = (double *)voidage_array(link_, VOIDAGE_RADIUS), *m = (double *)voidage_array(link_, VOIDAGE_MASS);
+  double *w = (double *)voidage_array(link_, VOIDAGE_ANGULAR_VELOCITY);
+  double *taken = (double *)voidage_array(link_, VOIDAGE_IMPULSE);
+  double *ledger = (double *)voidage_array(link_, VOIDAGE_LEDGER);
+  double *totals = (double *)voidage_array(link_, VOIDAGE_TOTALS);
+  if (!id || !type || !x || !v || !r || !m || !w || !taken || !ledger || !totals) stop(voidage_last_error());
+  for (uint64_t i = 0; i < n; i++) {
+    double *a = a_[i];
+    id[i] = atom->tag[i];
+    type[i] = atom->type[i];
+    r[i] = atom->radius[i];
+    m[i] = atom->rmass[i];
+    for (int k = 0; k < 3; k++) {
+      // the fluid was given `charged` and the old ledger in full: what it still misses is taken - charged
+      a[LEDGER + k] = a[TAKEN + k] - a[CHARGED + k];
+      x[3 * i + k] = atom->x[i][k];
+      v[3 * i + k] = atom->v[i][k];
+      w[3 * i + k] = atom->omega[i][k];
+      taken[3 * i + k] = a[TAKEN + k];
+      ledger[3 * i + k] = a[LEDGER + k];
+      a[TAKEN + k] = 0.0;
+    }
+  }
+  memcpy(totals, totals_, sizeof totals_);
+  if (voidage_send(link_)) stop(voidage_last_error());
+}
+
+void FixVoidage::receive()
+{
+  const int kind = voidage_receive(link_);
+  if (kind == VOIDAGE_STOP) {
+    const std::string reason = voidage_stop_reason(link_);
+    if (!reason.empty()) error->one(FLERR, ("fix voidage: the coupled run was stopped: " + reason).c_str());
+    if (comm->me == 0 && screen) fprintf(screen, "fix voidage: the coupled run is complete at step " BIGINT_FORMAT "\n", update->ntimestep);
+    if (comm->me == 0 && logfile) fprintf(logfile, "fix voidage: the coupled run is complete at step " BIGINT_FORMAT "\n", update->ntimestep);
+    ended_ = quit_ = true;
+    SignalHandler::request_quit = true;  // leaves the loop of this `run` after this step
+    voidage_close(link_);
+    link_ = NULL;
+    return;
+  }
+  if (kind < 0) stop(voidage_last_error());
+  if (kind != VOIDAGE_DRIVE) stop("an unexpected message came from the coupler");
+  const uint64_t n = atom->nlocal;
+  uint64_t nk = 0, nu = 0, nf = 0, nc = 0;
+  const double *kc = (const double *)voidage_read(link_, VOIDAGE_DRAG_COEFFICIENT, &nk);
+  const double *u = (const double *)voidage_read(link_, VOIDAGE_DRIVE_VELOCITY, &nu);
+  const double *f = (const double *)voidage_read(link_, VOIDAGE_FORCE, &nf);
+  const double *c = (const double *)voidage_read(link_, VOIDAGE_CHARGED, &nc);
+  if (!kc || !u || !f || !c) stop(voidage_last_error());
+  if (nk != n || nu != 3 * n || nf != 3 * n || nc != 3 * n || voidage_step(link_) != exchange_)
+    stop("the coupler answered for other particles or another exchange");
+  for (int k = 0; k < 9; k++) totals_[k] = 0.0;
+  for (uint64_t i = 0; i < n; i++) {
+    double *a = a_[i];
+    a[K] = kc[i];
+    for (int k = 0; k < 3; k++) {
+      a[U + k] = u[3 * i + k];
+      a[F + k] = f[3 * i + k];
+      a[CHARGED + k] = c[3 * i + k];
+      totals_[3 + k] += a[CHARGED + k];
+      totals_[6 + k] += a[LEDGER + k];
+    }
+  }
+  voidage_release(link_);
+}

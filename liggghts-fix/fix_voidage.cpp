@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// The fix's life: set-up, forces in each DEM step, exchanges every `interval` steps. See fix_voidage.h.
+//
+// Velocity Verlet: a force computed in post_force acts through the second half kick of this step and the
+// first of the next, so v moves from step n-1/2 to n+1/2 with it; the impulse `taken` sums these half kicks.
+// The exchange is in end_of_step, where v is at the full step: the new force replaces the old one in f.
+
+#include "fix_voidage.h"
+
+#include "atom.h"
+#include "comm.h"
+#include "domain.h"
+#include "error.h"
+#include "force.h"
+#include "memory.h"
+#include "modify.h"
+#include "update.h"
+
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <string>
+
+using namespace LAMMPS_NS;
+using namespace FixConst;
+
+namespace LAMMPS_NS { namespace SignalHandler { extern bool request_quit; } }
+
+FixVoidage::FixVoidage(LAMMPS *lmp, int narg, char **arg)
+  : Fix(lmp, narg, arg), link_(NULL), a_(NULL), first_step_(-1), exchange_(0), interval_(1), explicit_limit_(0.2),
+    constant_force_(false), ended_(false), quit_(false), integrated_(0), frozen_(0)
+{
+  check_host();
+  if (narg != 3 || strcmp(arg[1], "all") != 0)
+    error->all(FLERR, "fix voidage: it takes no arguments and works on all particles; type: fix ID all voidage");
+  if (!atom->radius_flag || !atom->rmass_flag || !atom->omega_flag)
+    error->all(FLERR, "fix voidage: the atom style has no radius, mass and angular velocity per particle; "
+                      "type: atom_style granular");
+  for (int i = 0; i < 9; i++) totals_[i] = 0.0;
+  nevery = 1;
+  create_attribute = 1;
+  vector_flag = 1;
+  size_vector = 6;
+  global_freq = 1;
+  extvector = 1;
+  grow_arrays(atom->nmax);
+  atom->add_callback(0);
+  for (int i = 0; i < atom->nlocal; i++) set_arrays(i);
+}
+
+FixVoidage::~FixVoidage()
+{
+  atom->delete_callback(id, 0);
+  memory->destroy(a_);
+  voidage_close(link_);
+}
+
+int FixVoidage::setmask() { return POST_FORCE | END_OF_STEP; }
+
+void FixVoidage::init()
+{
+  integrated_ = frozen_ = 0;
+  bool after = false;
+  for (int i = 0; i < modify->nfix; i++) {
+    Fix *f = modify->fix[i];
+    if (f == this) { after = true; continue; }
+    if (strcmp(f->style, style) == 0)
+      error->all(FLERR, "fix voidage: there are two of them; keep one");
+    if (f->time_integrate) integrated_ |= f->groupbit;
+    if (strncmp(f->style, "freeze", 6) == 0) frozen_ |= f->groupbit;
+    if (after && (modify->fmask[i] & POST_FORCE) && strncmp(f->style, "freeze", 6) != 0) {
+      std::string text = std::string("fix voidage: fix ") + f->id + " (" + f->style +
+                         ") adds forces after it; put the line `fix ... voidage` behind it in the script";
+      error->all(FLERR, text.c_str());
+    }
+  }
+}
+
+void FixVoidage::setup(int vflag)
+{
+  (void)vflag;
+  if (first_step_ < 0) {
+    open();
+    first_step_ = update->ntimestep;
+    exchange();
+  }
+  if (ended_) return;
+  // f was cleared and computed anew for this run; v is at a full step, so a half kick follows
+  double **f = atom->f;
+  for (int i = 0; i < atom->nlocal; i++) {
+    double fd[3];
+    if (constant_force_) memcpy(fd, &a_[i][FORCE], sizeof fd);
+    else fluid_force(i, 0.5 * update->dt, fd);
+    for (int k = 0; k < 3; k++) f[i][k] += a_[i][FORCE + k] = fd[k];
+  }
+}
+
+// Force of the fluid for a kick of duration h (s) from the present v; f holds all other forces.
+void FixVoidage::fluid_force(int i, double h, double *fd) const
+{
+  const double *a = a_[i], *v = atom->v[i], *f = atom->f[i];
+  const double m = atom->rmass[i], kc = a[K], x = kc * update->dt / m;
+  const bool moves = (atom->mask[i] & integrated_) && !(atom->mask[i] & frozen_);
+  if (x <= explicit_limit_ || !moves || constant_force_) {
+    for (int k = 0; k < 3; k++) fd[k] = kc * (a[U + k] - v[k]) + a[F + k];
+    return;
+  }
+  // exact relaxation over h towards u + (other forces)/K; exact at rest and at terminal velocity for any x
+  const double rate = -m / h * expm1(-kc * h / m);
+  for (int k = 0; k < 3; k++) {
+    const double other = f[k] + a[F + k];
+    fd[k] = rate * (a[U + k] + other / kc - v[k]) - f[k];
+  }
+}
+
+void FixVoidage::post_force(int vflag)
+{
+  (void)vflag;
+  if (ended_) return;
+  double **f = atom->f;
+  const double half = 0.5 * update->dt;
+  for (int i = 0; i < atom->nlocal; i++) {
+    double fd[3];
+    if (constant_force_) memcpy(fd, &a_[i][FORCE], sizeof fd);
+    else fluid_force(i, update->dt, fd);
+    for (int k = 0; k < 3; k++) {
+      const double impulse = half * (a_[i][FORCE + k] + fd[k]);
+      a_[i][TAKEN + k] += impulse;
+      totals_[k] += impulse;
+      a_[i][FORCE + k] = fd[k];
+      f[i][k] += fd[k];
+    }
+  }
+}
+
+void FixVoidage::end_of_step()
+{
+  if (ended_ || (update->ntimestep - first_step_) % interval_ != 0 || update->ntimestep == first_step_) return;
+  exchange_++;
+  exchange();
+  if (ended_) return;
+  double **f = atom->f;
+  for (int i = 0; i < atom->nlocal; i++) {
+    double fd[3];
+    for (int k = 0; k < 3; k++) f[i][k] -= a_[i][FORCE + k];
+    fluid_force(i, 0.5 * update->dt, fd);
+    for (int k = 0; k < 3; k++) f[i][k] += a_[i][FORCE + k] = fd[k];
+  }
+}
+
+void FixVoidage::post_run()
+{
+  if (!quit_) return;
+  SignalHandler::request_quit = false;  // so that later lines of the script run
+  quit_ = false;
+}
+
+// 1-3: force of the fluid, N; 4-6: ledger, N s; sums over all particles
+double FixVoidage::compute_vector(int n)
+{
+  const int column = n < 3 ? FORCE + n : LEDGER + n - 3;
+  double own = 0.0, all = 0.0;
+  for (int i = 0; i < atom->nlocal; i++) own += a_[i][column];
+  MPI_Allreduce(&own, &all, 1, MPI_DOUBLE, MPI_SUM, world);
+  return all;
+}
+
+double FixVoidage::memory_usage() { return (double)atom->nmax * COLUMNS * sizeof(double); }
+
+void FixVoidage::grow_arrays(int nmax) { memory->grow(a_, nmax, (int)COLUMNS, "voidage:per_atom"); }
+
+void FixVoidage::copy_arrays(int i, int j, int) { memcpy(a_[j], a_[i], COLUMNS * sizeof(double)); }
+
+// A particle inserted feels no fluid until the next exchange.
+void FixVoidage::set_arrays(int i) { memset(a_[i], 0, COLUMNS * sizeof(double)); }
+
+int FixVoidage::pack_exchange(int i, double *buf)
+{
+  memcpy(buf, a_[i], COLUMNS * sizeof(double));
+  return COLUMNS;
+}
+
+int FixVoidage::unpack_exchange(int i, double *buf)
+{
+  memcpy(a_[i], buf, COLUMNS * sizeof(double));
+  return COLUMNS;
+}

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// fix voidage: the particle side of the coupling. Reads drag coefficient K (kg/s), driving velocity u (m/s),
+// force F (N) and charged impulse (N s) per particle from the coupler; writes position, velocity, size, mass,
+// the impulse really taken and the ledger. Applies K (u - v) + F in every DEM step. Knows no fluid.
+//
+//   fix ID all voidage
+#ifndef VOIDAGE_FIX_H
+#define VOIDAGE_FIX_H
+
+#include "fix.h"
+#include "voidage.h"
+#include <vector>
+
+namespace LAMMPS_NS {
+
+class FixVoidage : public Fix {
+ public:
+  FixVoidage(class LAMMPS *, int, char **);
+  ~FixVoidage();
+  int setmask();
+  void init();
+  void setup(int);
+  void post_force(int);
+  void end_of_step();
+  void post_run();
+  double compute_vector(int);
+  double memory_usage();
+
+  void grow_arrays(int);
+  void copy_arrays(int, int, int);
+  void set_arrays(int);
+  int pack_exchange(int, double *);
+  int unpack_exchange(int, double *);
+
+ private:
+  // columns of the per-atom table
+  enum { K, U, F = U + 3, CHARGED = F + 3, TAKEN = CHARGED + 3, LEDGER = TAKEN + 3, FORCE = LEDGER + 3,
+         COLUMNS = FORCE + 3 };
+
+  voidage_link *link_;
+  double **a_;                 // per atom, COLUMNS wide
+  bigint first_step_;          // DEM step of exchange 0, -1: not yet
+  bigint exchange_;            // number of the last exchange
+  int interval_;               // DEM steps between exchanges
+  double explicit_limit_;      // largest K dt / m handled explicitly
+  bool constant_force_;        // force of the exchange held over the interval
+  bool ended_;                 // the coupler has ended the run: no fluid force any more
+  bool quit_;                  // this `run` is being ended
+  int integrated_, frozen_;    // group bits
+  double totals_[9];           // this rank: impulse taken, charged, old ledger (N s)
+
+  void check_host();
+  void check_settings();
+  double setting(const char *);
+  void open();
+  void exchange();
+  void send();
+  void receive();
+  void fluid_force(int i, double h, double *fd) const;
+  void stop(const char *);
+};
+
+}  // namespace LAMMPS_NS
+
+#endif
