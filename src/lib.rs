@@ -27,9 +27,13 @@ pub mod linearise;
 pub mod step;
 
 pub mod balance;
+pub mod commands;
+pub mod config;
 pub mod sums;
 
 pub mod comm;
 pub mod couple;
+pub mod launch;
 pub mod monitor;
 pub mod partners;
+pub mod setup;

@@ -1,1 +1,81 @@
-fn main(){}
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The command line: arguments, then the library, then an exit code (0 ok, 1 failed, 2 bad input, 130 interrupted).
+#![forbid(unsafe_code)]
+
+use clap::{Parser, Subcommand};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use voidage::commands;
+
+/// Couples OpenFOAM and LIGGGHTS: CFD-DEM with exact action and reaction.
+#[derive(Parser)]
+#[command(version, propagate_version = true)]
+struct Arguments {
+    /// error, warn, info, debug or trace
+    #[arg(long, global = true, default_value = "info")]
+    log: String,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Runs a case: starts both programs and the coupler, shows progress, stops all when one fails
+    Run {
+        /// folder with case.toml
+        case: PathBuf,
+        /// copy the case to this folder and run it there
+        #[arg(long)]
+        into: Option<PathBuf>,
+        /// override a key: section.key=value (repeatable)
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        set: Vec<String>,
+    },
+    /// Validates a case without running it and prints all problems at once
+    Check {
+        /// folder with case.toml
+        case: PathBuf,
+        /// override a key: section.key=value (repeatable)
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        set: Vec<String>,
+    },
+    /// The coupler itself, started by `voidage run` under mpirun
+    Couple {
+        /// folder with case.toml
+        case: PathBuf,
+        /// read the case as `voidage run` resolved it (logs/case.resolved.toml)
+        #[arg(long)]
+        resolved: bool,
+    },
+    /// Prints the reference of case.toml, or of monitor.csv
+    Explain {
+        /// case or monitor
+        #[arg(default_value = "case")]
+        topic: String,
+    },
+    /// Prints the versions of this program, its protocol and the partners found
+    Version,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let filter = tracing_subscriber::EnvFilter::try_new(&arguments.log);
+    let Ok(filter) = filter else {
+        eprintln_exit(&format!("--log {}: use error, warn, info, debug or trace", arguments.log));
+        return ExitCode::from(2);
+    };
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    let code = match arguments.command {
+        Command::Run { case, into, set } => commands::run(&case, into.as_deref(), &set),
+        Command::Check { case, set } => commands::check(&case, &set),
+        Command::Couple { case, resolved } => commands::couple(&case, resolved),
+        Command::Explain { topic } => commands::explain(&topic),
+        Command::Version => commands::version(),
+    };
+    ExitCode::from(code)
+}
+
+#[allow(clippy::print_stderr)]
+fn eprintln_exit(text: &str) {
+    eprintln!("{text}");
+}

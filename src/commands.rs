@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The commands of the program: from arguments to an exit code. What is printed for people is printed here.
+#![allow(clippy::print_stderr, clippy::print_stdout)]
+
+use crate::config::{self, CaseFile, Config, Problem, Severity};
+use crate::couple::{Exchange, receive_mesh};
+use crate::launch::{self, Outcome};
+use crate::monitor::{self, Monitor};
+use crate::partners::Partners;
+use crate::setup;
+use crate::step::CouplingStep;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+use voidage_shm::Hub;
+use voidage_wire::{PROTOCOL, Role, Session};
+
+/// All fine.
+pub const OK: u8 = 0;
+/// The run failed.
+pub const FAILED: u8 = 1;
+/// Bad input.
+pub const BAD_INPUT: u8 = 2;
+/// Ctrl-C.
+pub const INTERRUPTED: u8 = 130;
+
+fn overrides(set: &[String]) -> Result<Vec<(String, String)>, Vec<Problem>> {
+    let split = |s: &String| {
+        let bad = || vec![Problem::error("--set", s, "overrides are section.key=value", "--set smooth.bandwidth=3e-3")];
+        let (k, v) = s.split_once('=').ok_or_else(bad)?;
+        Ok((k.trim().to_string(), v.trim().to_string()))
+    };
+    set.iter().map(split).collect()
+}
+
+fn print(problems: &[Problem]) {
+    for p in problems {
+        eprintln!("{p}");
+    }
+}
+
+fn read(case: &Path, set: &[String]) -> Result<Config, u8> {
+    overrides(set).and_then(|o| config::load(case, &o)).map_err(|p| {
+        print(&p);
+        BAD_INPUT
+    })
+}
+
+/// `voidage check CASE`
+pub fn check(case: &Path, set: &[String]) -> u8 {
+    let config = match read(case, set) {
+        Ok(c) => c,
+        Err(code) => return code,
+    };
+    let problems = config::check(&config);
+    print(&problems);
+    let errors = problems.iter().filter(|p| p.severity == Severity::Error).count();
+    println!("{}: {errors} errors, {} warnings", case.display(), problems.len() - errors);
+    if errors == 0 { OK } else { BAD_INPUT }
+}
+
+/// `voidage run CASE`
+pub fn run(case: &Path, into: Option<&Path>, set: &[String]) -> u8 {
+    // problems of the original are told before anything is copied
+    let config = match read(case, set) {
+        Ok(c) => c,
+        Err(code) => return code,
+    };
+    let problems = config::check(&config);
+    print(&problems);
+    if problems.iter().any(|p| p.severity == Severity::Error) {
+        return BAD_INPUT;
+    }
+    let config = match into {
+        None => config,
+        Some(folder) => {
+            if let Err(e) = launch::prepare::copy(case, folder) {
+                eprintln!("error: {e}");
+                return BAD_INPUT;
+            }
+            match read(folder, set) {
+                Ok(c) => c,
+                Err(code) => return code,
+            }
+        }
+    };
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        if let Err(e) = signal_hook::flag::register(signal, Arc::clone(&stop)) {
+            eprintln!("error: signals cannot be caught: {e}");
+            return FAILED;
+        }
+    }
+    let begin = Instant::now();
+    match launch::run(&config, &stop) {
+        Ok(Outcome::Complete) => {
+            println!("complete in {:.1} s; results in {}", begin.elapsed().as_secs_f64(), config.folder.display());
+            OK
+        }
+        Ok(Outcome::Interrupted) => {
+            eprintln!("interrupted; all programs were stopped");
+            INTERRUPTED
+        }
+        Ok(Outcome::Failed(why)) => {
+            eprintln!("error: the run failed: {why}");
+            FAILED
+        }
+        Err(e) => {
+            eprintln!("error: {e}");
+            FAILED
+        }
+    }
+}
+
+/// `voidage couple CASE`; its standard output is read by `voidage run`.
+pub fn couple(case: &Path, resolved: bool) -> u8 {
+    match coupled(case, resolved) {
+        Ok(()) => OK,
+        Err(e) => {
+            println!("@error {}", e.replace('\n', "\t"));
+            FAILED
+        }
+    }
+}
+
+fn coupled(case: &Path, resolved: bool) -> Result<(), String> {
+    let _world = crate::comm::World::join()?;
+    let session = Session::from_environment()?;
+    let mut config = config::load(case, &[]).map_err(|p| p.iter().map(|p| format!("{p}\n")).collect::<String>())?;
+    if resolved {
+        let text = std::fs::read_to_string(case.join("logs/case.resolved.toml")).map_err(|e| e.to_string())?;
+        config.file = toml::from_str::<CaseFile>(&text).map_err(|e| e.to_string())?;
+    }
+    let hub = Hub::join(&session).map_err(|e| e.to_string())?;
+    let serve = |role, ranks| (0..ranks).map(|r| hub.serve(role, r)).collect::<Result<Vec<_>, _>>();
+    let dem = serve(Role::Dem, session.dem_ranks).map_err(|e| e.to_string())?;
+    let cfd = serve(Role::Cfd, session.cfd_ranks).map_err(|e| e.to_string())?;
+    session.announce().map_err(|e| e.to_string())?;
+    let mut partners = Partners::new(dem, cfd, Duration::from_secs_f64(session.wait));
+    let result = exchange(&config, &session, &mut partners);
+    if let Err(e) = &result {
+        partners.stop(e);
+        // last words must be read before the segments go
+        std::thread::sleep(Duration::from_millis(200));
+    }
+    result
+}
+
+fn exchange(
+    config: &Config,
+    session: &Session,
+    partners: &mut Partners<voidage_shm::Channel>,
+) -> Result<(), String> {
+    let start_limit = Duration::from_secs_f64(session.start);
+    partners.meet(&session.token, start_limit, || session.launcher.is_alive()).map_err(|e| e.to_string())?;
+    setup::agree(config, partners)?;
+    let welcome = setup::welcome(config);
+    for i in partners.dem().chain(partners.cfd()) {
+        partners.welcome(i, &welcome).map_err(|e| e.to_string())?;
+    }
+    let mesh = receive_mesh(partners).map_err(|e| e.to_string())?;
+    println!("mesh: {} cells of {} ranks", mesh.len(), session.cfd_ranks);
+    let [smoother, positive] = setup::smoothers(config, &mesh)?;
+    println!("smoothing: {}, {} sweeps", smoother.name(), smoother.degree());
+    let step = CouplingStep::new(mesh, setup::setup(config)?, setup::mapping(config)?, smoother, positive);
+    let monitor = Monitor::create(&config.folder.join("monitor.csv"), false).map_err(|e| e.to_string())?;
+    let steps = config.steps();
+    let mut said: Option<Instant> = None;
+    let mut progress = |row: &monitor::Row, s: &crate::couple::Summary| {
+        if said.is_none_or(|t| t.elapsed() > Duration::from_millis(250)) || row.step as u64 >= steps {
+            said = Some(Instant::now());
+            println!(
+                "@progress step={} time={} dem={:.4} cfd={:.4} coupler={:.4} action={:e} solid={:e}",
+                row.step, row.time, s.wait_dem, s.wait_cfd, s.coupler, s.worst_action_reaction, s.worst_solid_volume
+            );
+        }
+    };
+    let mut write = setup::writer(config);
+    let mut run = Exchange {
+        partners: Partners::new(Vec::new(), Vec::new(), Duration::ZERO),
+        step,
+        two_way: config.file.coupling.feedback == config::Feedback::TwoWay,
+        period: config.period(),
+        start: config.control.start,
+        monitor,
+        progress: &mut progress,
+        write: &mut *write,
+    };
+    std::mem::swap(&mut run.partners, partners);
+    let result = run.run();
+    std::mem::swap(&mut run.partners, partners);
+    let s = result.map_err(|e| e.to_string())?;
+    let cpu = setup::cpu_seconds();
+    println!(
+        "@summary {} exchanges to t = {} s: waiting for DEM {:.2} s, for CFD {:.2} s, coupler {:.2} s ({cpu:.2} s CPU)\t\
+         largest errors: action-reaction {:.1e}, solid volume {:.1e}; excluded {}, redone with the positive smoother {}",
+        s.steps, s.time, s.wait_dem, s.wait_cfd, s.coupler, s.worst_action_reaction, s.worst_solid_volume, s.excluded,
+        s.redone
+    );
+    Ok(())
+}
+
+/// `voidage explain`
+pub fn explain(topic: &str) -> u8 {
+    let row = |name: &str, unit: &str, text: &str| println!("{name:32} {unit:10} {text}");
+    match topic {
+        "case" => {
+            for (key, unit, default, text) in config::KEYS {
+                let default = if *default == "-" { "must be given".into() } else { format!("default {default}") };
+                row(key, unit, &format!("{text} ({default})"));
+            }
+        }
+        "monitor" => monitor::COLUMNS.iter().for_each(|(name, unit, text)| row(name, unit, text)),
+        _ => {
+            eprintln!("error: explain {topic}: topics are case, monitor; type: voidage explain case");
+            return BAD_INPUT;
+        }
+    }
+    OK
+}
+
+/// `voidage version`
+pub fn version() -> u8 {
+    println!("voidage {}, wire protocol {PROTOCOL}", env!("CARGO_PKG_VERSION"));
+    for package in ["openfoam", "liggghts", "lammps"] {
+        let out = std::process::Command::new("dpkg-query").args(["-W", "-f", "${Version}", package]).output();
+        let found = out.ok().filter(|o| o.status.success()).map(|o| String::from_utf8_lossy(&o.stdout).into_owned());
+        println!("{package}: {}", found.unwrap_or_else(|| "not installed as a package".into()));
+    }
+    match launch::companions() {
+        Ok(c) => println!("solver: {}\nfix: {}", c.solver.display(), c.fix.display()),
+        Err(e) => println!("{e}"),
+    }
+    OK
+}

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! What cannot work, or will surprise: checked across case.toml, the OpenFOAM case and the DEM script.
+
+use super::{Config, Feedback, GravityTreatment, InInterval, Model, Problem, foam, script};
+
+/// All problems of a case, errors first.
+pub fn check(c: &Config) -> Vec<Problem> {
+    let mut p = Vec::new();
+    values(c, &mut p);
+    models(c, &mut p);
+    times(c, &mut p);
+    let script = script::read(&c.script(), &c.file.dem.variables);
+    match &script {
+        Err(e) => p.push(Problem::error("dem.script", c.file.dem.script.display(), e, "set dem.script to the LIGGGHTS script")),
+        Ok(s) => dem(c, s, &mut p),
+    }
+    let case = c.fluid_case();
+    if let Some(nu) = foam::viscosity(&case)
+        && (nu / c.file.fluid.kinematic_viscosity - 1.0).abs() > 1e-6
+    {
+        let accepted = format!("constant/transportProperties has nu {nu}; drag and flow need the same viscosity");
+        let given = c.file.fluid.kinematic_viscosity;
+        p.push(Problem::error("fluid.kinematic_viscosity", given, &accepted, format!("fluid.kinematic_viscosity = {nu:e}")));
+    }
+    if !case.join("constant/polyMesh/points").exists() && !case.join("system/blockMeshDict").exists() {
+        let accepted = "the case has neither constant/polyMesh nor system/blockMeshDict";
+        p.push(Problem::error("fluid.case", c.file.fluid.case.display(), accepted, "make the mesh first, e.g. blockMesh"));
+    }
+    if let (Some(mesh), Ok(s)) = (foam::extent(&case), &script) {
+        meshes(c, &mesh, s, &mut p);
+    }
+    p.sort_by_key(|x| x.severity == super::Severity::Warning);
+    p
+}
+
+fn values(c: &Config, p: &mut Vec<Problem>) {
+    let f = &c.file;
+    if f.format != 1 {
+        p.push(Problem::error("format", f.format, "this version reads format 1", "format = 1"));
+    }
+    let mut range = |key: &str, value: f64, low: f64, high: f64, unit: &str| {
+        if !(value >= low && value <= high) {
+            let accepted = format!("between {low:e} and {high:e} {unit}: are the units right?");
+            p.push(Problem::error(key, value, &accepted, format!("give {key} in {unit}")));
+        }
+    };
+    range("fluid.density", f.fluid.density, 1e-2, 3e4, "kg/m3");
+    range("fluid.kinematic_viscosity", f.fluid.kinematic_viscosity, 1e-9, 1e2, "m2/s");
+    range("dem.time_step", f.dem.time_step, 1e-12, 1.0, "s");
+    range("limits.wait", f.limits.wait, 1.0, 1e6, "s");
+    range("smooth.tolerance", f.smooth.tolerance, 1e-14, 0.1, "");
+    if f.limits.voidage_min != 0.0 {
+        range("limits.voidage_min", f.limits.voidage_min, 0.01, 0.99, "");
+    }
+    if f.smooth.method != "none" {
+        range("smooth.bandwidth", f.smooth.bandwidth, 1e-9, 1e3, "m");
+    }
+    for (key, n) in [("run.dem_ranks", f.run.dem_ranks), ("run.cfd_ranks", f.run.cfd_ranks)] {
+        if n == 0 || n > 100_000 {
+            p.push(Problem::error(key, n, "at least 1", format!("{key} = 1")));
+        }
+    }
+    if f.coupling.interval == 0 {
+        p.push(Problem::error("coupling.interval", 0, "a number of DEM steps, at least 1", "coupling.interval = 20"));
+    }
+}
+
+fn models(c: &Config, p: &mut Vec<Problem>) {
+    let f = &c.file;
+    let stock = f.fluid.solver != "voidageFoam";
+    let two_way = f.coupling.feedback == Feedback::TwoWay;
+    if f.coupling.model == Model::A && two_way && !(f.forces.pressure_gradient && f.forces.viscous_stress) {
+        let accepted = "model A gives the particles their share of grad p and div tau; without it action is not reaction";
+        p.push(Problem::error("forces", "pressure_gradient or viscous_stress = false", accepted, "set both to true, or coupling.model = \"B\""));
+    }
+    if stock && (f.coupling.model == Model::A || f.forces.viscous_stress) {
+        let fix = "coupling.model = \"B\" and forces.viscous_stress = false, or fluid.solver = \"voidageFoam\"";
+        p.push(Problem::error("fluid.solver", &f.fluid.solver, "a stock solver knows no voidage: model B only", fix));
+    }
+    let moving = f.fluid.gravity.iter().any(|g| *g != 0.0);
+    if f.fluid.gravity_treatment == GravityTreatment::InPressure && !moving {
+        let fix = "fluid.gravity = [0.0, -9.81, 0.0]";
+        p.push(Problem::error("fluid.gravity_treatment", "in-pressure", "needs a gravity", fix));
+    }
+    if f.fluid.gravity_treatment == GravityTreatment::InPressure && stock {
+        let accepted = "only voidageFoam has gravity in the pressure; with the Archimedes force it would act twice";
+        p.push(Problem::error("fluid.gravity_treatment", "in-pressure", accepted, "gravity_treatment = \"archimedes\""));
+    }
+    if f.dem.force == InInterval::Constant {
+        let accepted = "a constant force over the interval errs by K Δt/(2 m)";
+        p.push(Problem::warning("dem.force", "constant", accepted, "dem.force = \"implicit\" is as fast and exact"));
+    }
+}
+
+fn times(c: &Config, p: &mut Vec<Problem>) {
+    let (period, step) = (c.period(), c.control.step);
+    if c.control.adjustable {
+        p.push(Problem::error("adjustTimeStep", "yes", "the coupling needs a fixed fluid step", "controlDict: adjustTimeStep no;"));
+    }
+    if (step / period - 1.0).abs() > 1e-9 {
+        let n = (step / c.file.dem.time_step).round();
+        let accepted = format!("the fluid step (controlDict deltaT {step}) must be interval x dem.time_step = {period:e}");
+        let fix = if n >= 1.0 && (step / (n * c.file.dem.time_step) - 1.0).abs() < 1e-9 {
+            format!("coupling.interval = {n}")
+        } else {
+            format!("controlDict: deltaT {period:e};")
+        };
+        p.push(Problem::error("coupling.interval", c.file.coupling.interval, &accepted, fix));
+    }
+    let steps = (c.control.end - c.control.start) / step;
+    if steps < 0.5 {
+        let given = format!("{} after start {}", c.control.end, c.control.start);
+        p.push(Problem::error("endTime", given, "there is nothing to run", "raise endTime in controlDict"));
+    } else if (steps - steps.round()).abs() > 1e-6 * steps.max(1.0) {
+        let fix = format!("controlDict: endTime {};", c.control.start + steps.round() * step);
+        p.push(Problem::error("endTime", c.control.end, "must be a whole number of steps", fix));
+    }
+}
+
+fn dem(c: &Config, s: &script::Script, p: &mut Vec<Problem>) {
+    let dt = c.file.dem.time_step;
+    if let Some(t) = s.time_step.filter(|t| (t / dt - 1.0).abs() > 1e-9) {
+        let accepted = format!("the script has timestep {t}");
+        p.push(Problem::error("dem.time_step", dt, &accepted, format!("dem.time_step = {t:e}")));
+    }
+    if let Some(u) = s.units.as_deref().filter(|u| *u != "si") {
+        p.push(Problem::error("units", u, "the coupling works in SI", "in the script: units si"));
+    }
+    if !s.has_fix {
+        let accepted = "the script has no `fix ... voidage`: nothing would be coupled";
+        p.push(Problem::error("dem.script", c.file.dem.script.display(), accepted, "add: fix voidage all voidage"));
+    }
+    if !s.has_run {
+        let accepted = "the script has no `run`";
+        p.push(Problem::error("dem.script", c.file.dem.script.display(), accepted, "add: run 1000000000"));
+    }
+    if let Some(r) = s.radius {
+        if !(1e-8..=1.0).contains(&r) {
+            p.push(Problem::error("radius", r, "between 1e-8 and 1 m: are the units right?", "give lengths in m"));
+        }
+        let b = c.file.smooth.bandwidth;
+        if c.file.smooth.method != "none" && b < 2.0 * r {
+            let fix = format!("smooth.bandwidth = {:e}", 8.0 * r);
+            p.push(Problem::warning("smooth.bandwidth", b, "below one particle diameter: the voidage follows single particles", fix));
+        }
+        if let Some(rho) = s.density {
+            relaxation(c, r, rho, p);
+        }
+    }
+}
+
+/// Time steps against the particle's relaxation time (R eq. 9).
+fn relaxation(c: &Config, radius: f64, density: f64, p: &mut Vec<Problem>) {
+    let mu = c.file.fluid.density * c.file.fluid.kinematic_viscosity;
+    let tau = density * (2.0 * radius).powi(2) / (18.0 * mu);
+    let x = c.period() / tau;
+    if c.file.coupling.scheme == "explicit" && x > 1.0 {
+        let accepted = format!("the fluid step is {x:.2} relaxation times (R eq. 9): explicit coupling is unstable");
+        p.push(Problem::error("coupling.scheme", "explicit", &accepted, "coupling.scheme = \"conservative\""));
+    }
+    if c.file.dem.force == InInterval::Constant && x > 0.01 {
+        let accepted = format!("the constant force errs by {:.1} % of the drag (limit 0.5 %)", 50.0 * x);
+        p.push(Problem::error("dem.force", "constant", &accepted, "dem.force = \"implicit\""));
+    }
+}
+
+fn meshes(c: &Config, mesh: &foam::Extent, s: &script::Script, p: &mut Vec<Problem>) {
+    let size = mesh.cells.map(|n| ((0..3).map(|a| mesh.upper[a] - mesh.lower[a]).product::<f64>() / n as f64).cbrt());
+    let b = c.file.smooth.bandwidth;
+    if let Some(h) = size.filter(|h| c.file.smooth.method != "none" && b < 0.5 * h) {
+        let accepted = format!("less than half the mean cell size {h:.3e} m: smoothing does almost nothing");
+        p.push(Problem::warning("smooth.bandwidth", b, &accepted, "smooth.method = \"none\", or a larger bandwidth"));
+    }
+    let Some((lower, upper)) = s.domain else { return };
+    for a in 0..3 {
+        let axis = ["x", "y", "z"][a];
+        let length = mesh.upper[a] - mesh.lower[a];
+        let slack = 1e-6 * length;
+        let given = format!("[{}, {}]", lower[a], upper[a]);
+        let accepted = format!("the CFD mesh has [{}, {}]", mesh.lower[a], mesh.upper[a]);
+        let periodic = s.boundary.as_ref().is_some_and(|b| b[a].starts_with('p'));
+        let equal = (lower[a] - mesh.lower[a]).abs() < slack && (upper[a] - mesh.upper[a]).abs() < slack;
+        if periodic && !equal {
+            let fix = "make both boxes equal in periodic directions";
+            p.push(Problem::error(&format!("DEM box in {axis}"), given, &accepted, fix));
+        } else if !periodic && (lower[a] > mesh.upper[a] || upper[a] < mesh.lower[a]) {
+            p.push(Problem::error(&format!("DEM box in {axis}"), given, &accepted, "they do not overlap: are the units right?"));
+        } else if !periodic && (lower[a] < mesh.lower[a] - slack || upper[a] > mesh.upper[a] + slack) {
+            let fix = "particles that leave the mesh stop the run; limits.outside = \"exclude\" leaves them out";
+            p.push(Problem::warning(&format!("DEM box in {axis}"), given, &accepted, fix));
+        }
+    }
+}

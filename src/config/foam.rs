@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The few facts of an OpenFOAM case that the checks need. Reads plain dictionaries (no macros, no includes);
+//! what it cannot read is `None`, never a guess.
+
+use std::path::Path;
+
+/// system/controlDict.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub struct Control {
+    pub start: f64,
+    pub end: f64,
+    pub step: f64,
+    pub adjustable: bool,
+}
+
+/// Box and cells of the mesh.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub struct Extent {
+    pub lower: [f64; 3],
+    pub upper: [f64; 3],
+    /// number of cells, if known
+    pub cells: Option<usize>,
+}
+
+/// Text without comments.
+fn plain(text: &str) -> String {
+    let (mut out, mut rest) = (String::new(), text);
+    while let Some(i) = rest.find("//").into_iter().chain(rest.find("/*")).min() {
+        out.push_str(&rest[..i]);
+        let end = if rest[i..].starts_with("//") { rest[i..].find('\n') } else { rest[i..].find("*/").map(|e| e + 2) };
+        rest = end.map_or("", |e| &rest[i + e..]);
+        out.push(' ');
+    }
+    out + rest
+}
+
+/// First value of an entry `key value…;`.
+pub fn entry(text: &str, key: &str) -> Option<String> {
+    let text = plain(text);
+    text.split([';', '{', '}']).find_map(|s| {
+        let mut words = s.split_whitespace();
+        (words.next() == Some(key)).then(|| words.collect::<Vec<_>>().join(" "))
+    })
+}
+
+fn number(text: &str, key: &str) -> Option<f64> {
+    entry(text, key)?.split_whitespace().last()?.parse().ok()
+}
+
+impl Control {
+    /// Reads a controlDict; the error says what is missing.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let need = |key: &str| number(&text, key).ok_or(format!("{} has no number {key}", path.display()));
+        let from = entry(&text, "startFrom").unwrap_or_else(|| "startTime".into());
+        let start = if from == "startTime" { need("startTime")? } else { latest(path).unwrap_or(0.0) };
+        let adjustable = entry(&text, "adjustTimeStep").is_some_and(|v| ["yes", "on", "true"].contains(&&*v));
+        Ok(Self { start, end: need("endTime")?, step: need("deltaT")?, adjustable })
+    }
+}
+
+/// Latest time folder of the case that holds system/controlDict.
+fn latest(control: &Path) -> Option<f64> {
+    let case = control.parent()?.parent()?;
+    let names = std::fs::read_dir(case).ok()?.flatten().filter_map(|e| e.file_name().into_string().ok());
+    names.filter_map(|n| n.parse::<f64>().ok()).max_by(f64::total_cmp)
+}
+
+/// nu of constant/transportProperties, m2/s.
+pub fn viscosity(case: &Path) -> Option<f64> {
+    number(&std::fs::read_to_string(case.join("constant/transportProperties")).ok()?, "nu")
+}
+
+/// Box of the mesh, from blockMeshDict or ascii polyMesh points.
+pub fn extent(case: &Path) -> Option<Extent> {
+    from_block_mesh(case).or_else(|| {
+        let text = std::fs::read_to_string(case.join("constant/polyMesh/points")).ok()?;
+        bounds(&vectors(&plain(&text)), 1.0, None)
+    })
+}
+
+/// "(x y z)" groups of numbers in a text.
+fn vectors(text: &str) -> Vec<[f64; 3]> {
+    let triple = |s: &str| {
+        let n: Vec<f64> = s.split_whitespace().map_while(|w| w.parse().ok()).collect();
+        (n.len() == 3 && s.split_whitespace().count() == 3).then(|| [n[0], n[1], n[2]])
+    };
+    text.split('(').filter_map(|s| triple(s.split(')').next()?)).collect()
+}
+
+fn bounds(points: &[[f64; 3]], scale: f64, cells: Option<usize>) -> Option<Extent> {
+    let mut e = Extent { lower: [f64::INFINITY; 3], upper: [f64::NEG_INFINITY; 3], cells };
+    for p in points {
+        for a in 0..3 {
+            e.lower[a] = e.lower[a].min(scale * p[a]);
+            e.upper[a] = e.upper[a].max(scale * p[a]);
+        }
+    }
+    (!points.is_empty()).then_some(e)
+}
+
+fn from_block_mesh(case: &Path) -> Option<Extent> {
+    let text = plain(&std::fs::read_to_string(case.join("system/blockMeshDict")).ok()?);
+    if text.contains('#') || text.contains('$') || text.contains("arc ") {
+        return None; // computed entries or curved edges: not for us
+    }
+    let scale = number(&text, "convertToMeters").or_else(|| number(&text, "scale")).unwrap_or(1.0);
+    let section = |name: &str| {
+        let at = text.find(name)? + name.len();
+        let end = text[at..].find(';')?;
+        Some(&text[at..at + end])
+    };
+    let triples = vectors(section("blocks")?);
+    let cells = triples.iter().filter(|v| v.iter().all(|x| *x >= 1.0 && x.fract() == 0.0));
+    let cells: f64 = cells.map(|v| v.iter().product::<f64>()).sum();
+    bounds(&vectors(section("vertices")?), scale, (cells > 0.0).then_some(cells as usize))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn entries_are_found_past_comments() {
+        let text = "/* deltaT 3; */ // deltaT 4;\nFoamFile { version 2; }\nstartTime 0; endTime\n0.4; deltaT 2e-4;";
+        assert_eq!(number(text, "deltaT"), Some(2e-4));
+        assert_eq!(number(text, "endTime"), Some(0.4));
+        assert_eq!(number("nu [0 2 -1 0 0 0 0] 1e-5;", "nu"), Some(1e-5));
+        assert_eq!(vectors("((0 0 0) (1 2.5 3) (a b c)) (4 5)"), [[0.0; 3], [1.0, 2.5, 3.0]]);
+    }
+}

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The case file: `raw` reads case.toml (unknown keys refused), `check` finds what cannot work.
+//!
+//! `foam` and `script` read the few facts needed from OpenFOAM dictionaries and LIGGGHTS scripts. All problems
+//! are reported at once, each with where, what was given, what is accepted and what to type.
+
+mod check;
+pub mod foam;
+mod raw;
+pub mod script;
+
+pub use check::check;
+use raw::parse;
+pub use raw::*;
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// How bad a problem is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// The run would fail or be wrong.
+    Error,
+    /// The run works; the result may surprise.
+    Warning,
+}
+
+/// A problem of a case.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Problem {
+    /// error or warning
+    pub severity: Severity,
+    /// key or file
+    pub place: String,
+    /// what was found
+    pub given: String,
+    /// what is accepted, and why
+    pub accepted: String,
+    /// what to type
+    pub fix: String,
+}
+
+impl Problem {
+    pub(crate) fn error(place: &str, given: impl fmt::Display, accepted: &str, fix: impl fmt::Display) -> Self {
+        let (place, given) = (place.into(), given.to_string());
+        Self { severity: Severity::Error, place, given, accepted: accepted.into(), fix: fix.to_string() }
+    }
+    pub(crate) fn warning(place: &str, given: impl fmt::Display, accepted: &str, fix: impl fmt::Display) -> Self {
+        Self { severity: Severity::Warning, ..Self::error(place, given, accepted, fix) }
+    }
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let kind = if self.severity == Severity::Error { "error" } else { "warning" };
+        write!(f, "{kind}: {} = {}: {}; {}", self.place, self.given, self.accepted, self.fix)
+    }
+}
+
+/// A case, read and complete; paths absolute.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// the case folder
+    pub folder: PathBuf,
+    /// what case.toml says
+    pub file: CaseFile,
+    /// what system/controlDict says
+    pub control: foam::Control,
+}
+
+impl Config {
+    /// Fluid step = coupling period, s.
+    pub fn period(&self) -> f64 {
+        f64::from(self.file.coupling.interval) * self.file.dem.time_step
+    }
+    /// The OpenFOAM case.
+    pub fn fluid_case(&self) -> PathBuf {
+        self.folder.join(&self.file.fluid.case)
+    }
+    /// The DEM script.
+    pub fn script(&self) -> PathBuf {
+        self.folder.join(&self.file.dem.script)
+    }
+    /// Fluid steps of the run.
+    pub fn steps(&self) -> u64 {
+        ((self.control.end - self.control.start) / self.period()).round().max(0.0) as u64
+    }
+}
+
+/// Reads CASE/case.toml with overrides (`section.key`, value).
+pub fn load(folder: &Path, overrides: &[(String, String)]) -> Result<Config, Vec<Problem>> {
+    let file = folder.join("case.toml");
+    let name = file.display().to_string();
+    let text = std::fs::read_to_string(&file).map_err(|e| {
+        vec![Problem::error(&name, e, "a case is a folder with a case.toml", "voidage run FOLDER")]
+    })?;
+    let file = parse(&text, overrides).map_err(|mut p| {
+        p.iter_mut().filter(|p| p.place.is_empty()).for_each(|p| p.place.clone_from(&name));
+        p
+    })?;
+    let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
+    let control = folder.join(&file.fluid.case).join("system/controlDict");
+    let control = foam::Control::read(&control).map_err(|e| {
+        let fix = "set fluid.case to the OpenFOAM case (folder with system/controlDict)";
+        vec![Problem::error("fluid.case", file.fluid.case.display(), &e, fix)]
+    })?;
+    Ok(Config { folder, file, control })
+}

@@ -1,0 +1,407 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! case.toml as it is typed: sections, keys, defaults. `KEYS` is their reference (`voidage explain`).
+
+use super::Problem;
+use crate::interpolate::FluidVelocity;
+use crate::{forces, map, scheme, smooth};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// The whole file.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs)]
+pub struct CaseFile {
+    pub format: u32,
+    #[serde(default)]
+    pub run: Run,
+    pub fluid: Fluid,
+    pub dem: Dem,
+    pub coupling: Coupling,
+    #[serde(default)]
+    pub map: Map,
+    pub smooth: Smooth,
+    #[serde(default)]
+    pub interpolate: Interpolate,
+    pub forces: Forces,
+    #[serde(default)]
+    pub output: Output,
+    #[serde(default)]
+    pub limits: Limits,
+}
+
+/// [run]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs)]
+pub struct Run {
+    pub dem_ranks: u32,
+    pub cfd_ranks: u32,
+}
+impl Default for Run {
+    fn default() -> Self {
+        Self { dem_ranks: 1, cfd_ranks: 1 }
+    }
+}
+
+/// Where the weight of the fluid goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)]
+pub enum GravityTreatment {
+    Archimedes,
+    InPressure,
+    None,
+}
+
+/// Is the fluid solved?
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)]
+pub enum Flow {
+    Solved,
+    Frozen,
+}
+
+fn fluid_case() -> PathBuf {
+    "fluid".into()
+}
+fn voidage_foam() -> String {
+    "voidageFoam".into()
+}
+fn archimedes() -> GravityTreatment {
+    GravityTreatment::Archimedes
+}
+fn solved() -> Flow {
+    Flow::Solved
+}
+
+/// [fluid]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs)]
+pub struct Fluid {
+    #[serde(default = "fluid_case")]
+    pub case: PathBuf,
+    #[serde(default = "voidage_foam")]
+    pub solver: String,
+    pub density: f64,
+    pub kinematic_viscosity: f64,
+    pub gravity: [f64; 3],
+    #[serde(default = "archimedes")]
+    pub gravity_treatment: GravityTreatment,
+    #[serde(default)]
+    pub mean_pressure_gradient: [f64; 3],
+    #[serde(default = "solved")]
+    pub flow: Flow,
+}
+
+/// How the force acts within an interval.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)]
+pub enum InInterval {
+    Implicit,
+    Constant,
+}
+fn implicit() -> InInterval {
+    InInterval::Implicit
+}
+fn liggghts() -> String {
+    "liggghts".into()
+}
+
+/// [dem]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs)]
+pub struct Dem {
+    #[serde(default = "liggghts")]
+    pub program: String,
+    pub script: PathBuf,
+    pub time_step: f64,
+    #[serde(default = "implicit")]
+    pub force: InInterval,
+    #[serde(default)]
+    pub variables: BTreeMap<String, String>,
+}
+
+/// Split of the pressure-gradient force.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[allow(missing_docs)]
+pub enum Model {
+    A,
+    B,
+}
+/// Does the fluid feel the particles?
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)]
+pub enum Feedback {
+    TwoWay,
+    OneWay,
+}
+/// Volume source of the fluid's continuity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)]
+pub enum Continuity {
+    VoidageRate,
+    SolidsFlux,
+}
+fn conservative() -> String {
+    "conservative".into()
+}
+fn model_a() -> Model {
+    Model::A
+}
+fn two_way() -> Feedback {
+    Feedback::TwoWay
+}
+fn voidage_rate() -> Continuity {
+    Continuity::VoidageRate
+}
+
+/// [coupling]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs)]
+pub struct Coupling {
+    pub interval: u32,
+    #[serde(default = "conservative")]
+    pub scheme: String,
+    #[serde(default = "model_a")]
+    pub model: Model,
+    #[serde(default = "two_way")]
+    pub feedback: Feedback,
+    #[serde(default = "voidage_rate")]
+    pub continuity: Continuity,
+}
+
+/// [map]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs)]
+pub struct Map {
+    pub method: String,
+}
+impl Default for Map {
+    fn default() -> Self {
+        Self { method: "particle-centroid".into() }
+    }
+}
+
+fn chebyshev() -> String {
+    "chebyshev".into()
+}
+fn tolerance() -> f64 {
+    1e-4
+}
+
+/// [smooth]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs)]
+pub struct Smooth {
+    #[serde(default = "chebyshev")]
+    pub method: String,
+    #[serde(default)]
+    pub bandwidth: f64,
+    #[serde(default = "tolerance")]
+    pub tolerance: f64,
+}
+
+/// [interpolate]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs)]
+pub struct Interpolate {
+    pub fluid_velocity: String,
+}
+impl Default for Interpolate {
+    fn default() -> Self {
+        Self { fluid_velocity: "gather".into() }
+    }
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// [forces]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs)]
+pub struct Forces {
+    pub drag: String,
+    #[serde(default = "yes")]
+    pub pressure_gradient: bool,
+    #[serde(default = "yes")]
+    pub viscous_stress: bool,
+}
+
+/// [output]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs)]
+pub struct Output {
+    pub fields: bool,
+    pub particles: bool,
+    pub picture: String,
+}
+impl Default for Output {
+    fn default() -> Self {
+        Self { fields: true, particles: true, picture: "none".into() }
+    }
+}
+
+/// [limits]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs)]
+pub struct Limits {
+    pub wait: f64,
+    pub outside: String,
+    pub voidage_min: f64,
+}
+impl Default for Limits {
+    fn default() -> Self {
+        Self { wait: 60.0, outside: "error".into(), voidage_min: 0.0 }
+    }
+}
+
+/// Reference of all keys: key, unit, default ("-" = must be given), meaning.
+pub const KEYS: &[(&str, &str, &str, &str)] = &[
+    ("format", "", "-", "version of this file, 1"),
+    ("run.dem_ranks", "", "1", "MPI ranks of the particle program"),
+    ("run.cfd_ranks", "", "1", "MPI ranks of the fluid solver; the case is decomposed when needed"),
+    ("fluid.case", "", "fluid", "OpenFOAM case, below the case folder"),
+    ("fluid.solver", "", "voidageFoam", "voidageFoam, or a stock solver with fvOptions (dilute, model B)"),
+    ("fluid.density", "kg/m3", "-", "density of the fluid"),
+    ("fluid.kinematic_viscosity", "m2/s", "-", "must equal nu of transportProperties"),
+    ("fluid.gravity", "m/s2", "-", "gravity as in the DEM script, for Archimedes or in-pressure"),
+    ("fluid.gravity_treatment", "", "archimedes", "archimedes (force on particles) | in-pressure (eps rho g in the fluid) | none"),
+    ("fluid.mean_pressure_gradient", "Pa/m", "[0,0,0]", "prescribed mean gradient, for periodic boxes"),
+    ("fluid.flow", "", "solved", "solved | frozen"),
+    ("dem.program", "", "liggghts", "particle program"),
+    ("dem.script", "", "-", "its input script"),
+    ("dem.time_step", "s", "-", "must equal `timestep` of the script"),
+    ("dem.force", "", "implicit", "implicit (K(u-v)+f in each DEM step) | constant"),
+    ("dem.variables", "", "{}", "passed as -var name value"),
+    ("coupling.interval", "DEM steps", "-", "fluid step = interval x dem.time_step"),
+    ("coupling.scheme", "", "conservative", "conservative | explicit"),
+    ("coupling.model", "", "A", "A | B: split of pressure gradient and stress"),
+    ("coupling.feedback", "", "two-way", "two-way | one-way"),
+    ("coupling.continuity", "", "voidage-rate", "voidage-rate (d eps/dt) | solids-flux (SX eq. 2a)"),
+    ("map.method", "", "particle-centroid", "particle-centroid"),
+    ("smooth.method", "", "chebyshev", "chebyshev | uniformization (positive by proof) | none"),
+    ("smooth.bandwidth", "m", "-", "b of the Gaussian exp(-r2/b2); 4 to 6 particle diameters"),
+    ("smooth.tolerance", "", "1e-4", "error of the smoothing operator"),
+    ("interpolate.fluid_velocity", "", "gather", "gather | host-cell | linear"),
+    ("forces.drag", "", "-", "stokes schiller-naumann di-felice gidaspow beetstra syamlal-obrien koch-hill wen-yu none"),
+    ("forces.pressure_gradient", "", "true", "-V grad p on the particles (model A)"),
+    ("forces.viscous_stress", "", "true", "V div tau on the particles (model A)"),
+    ("output.fields", "", "true", "cell fields for ParaView at the fluid's write times"),
+    ("output.particles", "", "true", "particles for ParaView at the fluid's write times"),
+    ("output.picture", "", "none", "none | x | y | z: animation of the particles seen along that axis"),
+    ("limits.wait", "s", "60", "longest wait for a peer"),
+    ("limits.outside", "", "error", "error | exclude: particles outside the mesh"),
+    ("limits.voidage_min", "", "0", "cap the voidage from below (counted); 0: stop the run instead"),
+];
+
+/// Nearest of the known names.
+pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let distance = |a: &str, b: &str| {
+        let b: Vec<char> = b.chars().collect();
+        let mut row: Vec<usize> = (0..=b.len()).collect();
+        for (i, x) in a.chars().enumerate() {
+            let mut last = row[0];
+            row[0] = i + 1;
+            for (j, y) in b.iter().enumerate() {
+                let next = (last + usize::from(x != *y)).min(row[j] + 1).min(row[j + 1] + 1);
+                last = std::mem::replace(&mut row[j + 1], next);
+            }
+        }
+        row[b.len()]
+    };
+    let best = known.into_iter().map(|k| (distance(name, k), k)).min()?;
+    (best.0 <= name.len() / 2 + 1).then_some(best.1)
+}
+
+/// Parses and applies overrides. Problems without a place are about the file itself.
+pub(super) fn parse(text: &str, overrides: &[(String, String)]) -> Result<CaseFile, Vec<Problem>> {
+    let syntax = |e: toml::de::Error| {
+        let line = e.span().map(|s| text[..s.start.min(text.len())].lines().count().max(1));
+        let given = line.map(|l| format!("line {l}")).unwrap_or_default();
+        vec![Problem::error("", given, e.message(), "see `voidage explain`")]
+    };
+    let mut table: toml::Table = toml::from_str(text).map_err(syntax)?;
+    for (key, value) in overrides {
+        set(&mut table, key, value)?;
+    }
+    let unknown: Vec<Problem> = unknown_keys(&table);
+    if !unknown.is_empty() {
+        return Err(unknown);
+    }
+    let file = CaseFile::deserialize(table).map_err(|e| {
+        vec![Problem::error("", "its content", &e.message().replace('\n', " "), "see `voidage explain`")]
+    })?;
+    let problems = names(&file);
+    if problems.is_empty() { Ok(file) } else { Err(problems) }
+}
+
+fn set(table: &mut toml::Table, key: &str, value: &str) -> Result<(), Vec<Problem>> {
+    let parsed = toml::from_str::<toml::Table>(&format!("x = {value}")).ok().and_then(|mut t| t.remove("x"));
+    let value = parsed.unwrap_or_else(|| toml::Value::String(value.into()));
+    let bad = || vec![Problem::error(key, &value, "overrides are section.key=value", "see `voidage explain`")];
+    let (path, last) = key.rsplit_once('.').ok_or_else(bad)?;
+    let mut at = table;
+    for part in path.split('.') {
+        let next = at.entry(part).or_insert_with(|| toml::Value::Table(toml::Table::new()));
+        at = next.as_table_mut().ok_or_else(bad)?;
+    }
+    at.insert(last.into(), value);
+    Ok(())
+}
+
+fn unknown_keys(table: &toml::Table) -> Vec<Problem> {
+    let mut problems = Vec::new();
+    let known = || KEYS.iter().map(|k| k.0);
+    for (section, value) in table {
+        let keys: Vec<String> = match value {
+            toml::Value::Table(t) => t.keys().map(|k| format!("{section}.{k}")).collect(),
+            _ => vec![section.clone()],
+        };
+        for key in keys.into_iter().filter(|k| !known().any(|n| n == k)) {
+            let fix = match nearest(&key, known()) {
+                Some(n) => format!("did you mean {n}?"),
+                None => "see `voidage explain`".into(),
+            };
+            problems.push(Problem::error(&key, "?", "this key is unknown", fix));
+        }
+    }
+    problems
+}
+
+/// Names from lists, with the nearest match.
+fn names(file: &CaseFile) -> Vec<Problem> {
+    let mut problems = Vec::new();
+    let mut check = |key: &str, given: &str, list: Vec<&str>| {
+        if !list.contains(&given) {
+            let near = nearest(given, list.iter().copied()).map(|n| format!("{key} = \"{n}\"?")).unwrap_or_default();
+            let accepted = format!("accepted: {}", list.join(", "));
+            let fix = if near.is_empty() { format!("{key} = \"{}\"", list[0]) } else { near };
+            problems.push(Problem::error(key, format!("\"{given}\""), &accepted, fix));
+        }
+    };
+    check("forces.drag", &file.forces.drag, forces::all().iter().map(|l| l.name()).collect());
+    check("coupling.scheme", &file.coupling.scheme, scheme::all().iter().map(|s| s.name()).collect());
+    check("map.method", &file.map.method, map::all().iter().map(|m| m.name()).collect());
+    check("smooth.method", &file.smooth.method, smooth::NAMES.to_vec());
+    check("interpolate.fluid_velocity", &file.interpolate.fluid_velocity, FluidVelocity::NAMES.to_vec());
+    check("limits.outside", &file.limits.outside, vec!["error", "exclude"]);
+    check("output.picture", &file.output.picture, vec!["none", "x", "y", "z"]);
+    check("dem.program", &file.dem.program, vec!["liggghts"]);
+    problems
+}

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The few facts of a LIGGGHTS script that the checks need. Variables given as plain numbers are put in; what
+//! cannot be read is `None`, never a guess.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// What the script says.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[allow(missing_docs)]
+pub struct Script {
+    pub time_step: Option<f64>,
+    pub units: Option<String>,
+    /// box of `create_box` or of the data file, m
+    pub domain: Option<([f64; 3], [f64; 3])>,
+    /// "p" or others, per axis
+    pub boundary: Option<[String; 3]>,
+    pub has_fix: bool,
+    pub has_run: bool,
+    pub radius: Option<f64>,
+    pub density: Option<f64>,
+}
+
+/// Reads a script; `-var` values win over `variable` lines.
+pub fn read(path: &Path, given: &BTreeMap<String, String>) -> Result<Script, String> {
+    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let mut variables = given.clone();
+    let (mut s, mut regions, mut boxed) = (Script::default(), BTreeMap::new(), None::<String>);
+    for line in text.replace("&\n", " ").lines() {
+        let line = substitute(line.split('#').next().unwrap_or(""), &variables);
+        let w: Vec<&str> = line.split_whitespace().collect();
+        let n = |i: usize| w.get(i).and_then(|x| x.parse::<f64>().ok());
+        match w.first().copied() {
+            Some("variable") if w.len() >= 4 => {
+                variables.entry(w[1].into()).or_insert_with(|| w[3].into());
+            }
+            Some("timestep") => s.time_step = n(1),
+            Some("units") => s.units = w.get(1).map(|u| (*u).into()),
+            Some("boundary") if w.len() >= 4 => s.boundary = Some([w[1].into(), w[2].into(), w[3].into()]),
+            Some("region") if w.get(2) == Some(&"block") => {
+                let v: Vec<f64> = (3..9).filter_map(n).collect();
+                if v.len() == 6 {
+                    regions.insert(w[1].to_string(), ([v[0], v[2], v[4]], [v[1], v[3], v[5]]));
+                }
+            }
+            Some("create_box") => boxed = w.get(2).map(|r| (*r).into()),
+            Some("read_data") => {
+                s.domain = w.get(1).and_then(|f| data_box(&path.parent().unwrap_or(Path::new(".")).join(f)));
+            }
+            Some("fix") if w.get(3) == Some(&"voidage") => s.has_fix = true,
+            Some("run" | "rerun") => s.has_run = true,
+            Some("set") if line.contains("density") || line.contains("diameter") => {
+                let after = |key: &str| w.iter().position(|x| *x == key).and_then(|i| n(i + 1));
+                s.density = after("density").or(s.density);
+                s.radius = after("diameter").map(|d| 0.5 * d).or(s.radius);
+            }
+            _ => {}
+        }
+    }
+    if let Some(b) = boxed.and_then(|r| regions.get(&r).copied()) {
+        s.domain = Some(b);
+    }
+    Ok(s)
+}
+
+fn substitute(line: &str, variables: &BTreeMap<String, String>) -> String {
+    variables.iter().fold(line.to_string(), |l, (k, v)| l.replace(&format!("${{{k}}}"), v))
+}
+
+/// "lo hi xlo xhi" lines at the head of a data file.
+fn data_box(path: &Path) -> Option<([f64; 3], [f64; 3])> {
+    let text = std::fs::read_to_string(path).ok()?;
+    let axis = |a: &str| {
+        let line = text.lines().take(40).find(|l| l.trim_end().ends_with(&format!("{a}lo {a}hi")))?;
+        let v: Vec<f64> = line.split_whitespace().take(2).filter_map(|x| x.parse().ok()).collect();
+        (v.len() == 2).then(|| (v[0], v[1]))
+    };
+    let (x, y, z) = (axis("x")?, axis("y")?, axis("z")?);
+    Some(([x.0, y.0, z.0], [x.1, y.1, z.1]))
+}

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! `voidage run`: three groups of processes, one terminal. Prepares the case, starts the groups by mpirun,
+//! shows progress, stops all when one fails. Never calls MPI itself; does not know what is exchanged.
+
+pub mod groups;
+pub mod prepare;
+mod ui;
+
+use crate::config::Config;
+use groups::{Group, Groups};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use voidage_wire::{Session, session};
+
+/// Longest start-up of all programs, s.
+const START: f64 = 60.0;
+/// What the others get to end by themselves after one has failed.
+const GRACE: Duration = Duration::from_secs(4);
+
+/// How a run ended.
+#[derive(Debug, PartialEq)]
+pub enum Outcome {
+    /// All programs ended well.
+    Complete,
+    /// Which and why.
+    Failed(String),
+    /// Ctrl-C.
+    Interrupted,
+}
+
+/// Files of this installation.
+pub struct Companions {
+    /// this program
+    pub voidage: PathBuf,
+    /// the solver
+    pub solver: PathBuf,
+    /// the LIGGGHTS fix
+    pub fix: PathBuf,
+}
+
+/// Finds them: $VOIDAGE_HOME, the prefix this program is in, or the build tree it was made in.
+pub fn companions() -> Result<Companions, String> {
+    let exe = std::env::current_exe().map_err(|e| e.to_string())?;
+    let mut homes: Vec<PathBuf> = std::env::var_os("VOIDAGE_HOME").map(PathBuf::from).into_iter().collect();
+    if homes.is_empty() {
+        homes.extend(exe.ancestors().skip(2).take(1).map(Path::to_path_buf));
+        homes.extend(exe.ancestors().skip(1).map(|a| a.join("build")));
+    }
+    let found = homes.iter().find(|h| h.join("lib/libvoidageLiggghts.so").exists());
+    let home = found.ok_or(
+        "libvoidageLiggghts.so was not found beside this program: type ./setup build, or set VOIDAGE_HOME to the prefix",
+    )?;
+    Ok(Companions {
+        voidage: exe,
+        solver: home.join("bin/voidageFoam"),
+        fix: home.join("lib/libvoidageLiggghts.so"),
+    })
+}
+
+fn mpirun(ranks: u32, export: &[&str]) -> Vec<String> {
+    let mut c = vec!["mpirun".to_string()];
+    let root = std::os::unix::fs::MetadataExt::uid(&std::fs::metadata("/proc/self").ok().unwrap_or_else(|| {
+        unreachable!("/proc is there on Linux")
+    })) == 0;
+    if root {
+        c.push("--allow-run-as-root".into());
+    }
+    // two mpiruns on one machine would bind to the same cores; waiting ranks must yield to the others
+    c.extend(["--oversubscribe", "--bind-to", "none", "--mca", "mpi_yield_when_idle", "1"].map(String::from));
+    c.extend(export.iter().flat_map(|e| ["-x".to_string(), (*e).to_string()]));
+    c.extend(["-np".to_string(), ranks.to_string()]);
+    c
+}
+
+/// Runs a case to its end. `stop` is set by Ctrl-C.
+pub fn run(config: &Config, stop: &AtomicBool) -> Result<Outcome, String> {
+    let home = companions()?;
+    let logs = config.folder.join("logs");
+    std::fs::create_dir_all(&logs).map_err(|e| format!("{}: {e}", logs.display()))?;
+    for token in voidage_shm::janitor::clean_dead().map_err(|e| e.to_string())? {
+        tracing::info!("removed what the dead run {token} left behind");
+    }
+    prepare::fluid(config, &logs)?;
+    let f = &config.file;
+    let resolved = toml::to_string(f).map_err(|e| e.to_string())?;
+    std::fs::write(logs.join("case.resolved.toml"), resolved).map_err(|e| e.to_string())?;
+    let s = Session::create(&config.folder, f.run.dem_ranks, f.run.cfd_ranks, f.limits.wait, START);
+    let s = s.map_err(|e| format!("the private folder of the run: {e}"))?;
+    let result = start(config, &home, &s, &logs, stop);
+    voidage_shm::janitor::clean(&s).map_err(|e| format!("cleaning {}: {e}", s.root.display()))?;
+    result
+}
+
+fn start(config: &Config, home: &Companions, s: &Session, logs: &Path, stop: &AtomicBool) -> Result<Outcome, String> {
+    let f = &config.file;
+    let session = format!("{}={}", session::VARIABLE, s.file().display());
+    let foam = std::env::var("WM_PROJECT_DIR").unwrap_or_else(|_| "/usr/share/openfoam".into());
+    let foam = format!("WM_PROJECT_DIR={foam}");
+    let preload = format!("LD_PRELOAD={}", home.fix.display());
+    let text = |p: &Path| p.display().to_string();
+
+    let mut couple = mpirun(1, &[&session]);
+    couple.extend([text(&home.voidage), "couple".into(), text(&config.folder), "--resolved".into()]);
+    let mut dem = mpirun(f.run.dem_ranks, &[&session, &preload]);
+    dem.extend([f.dem.program.clone(), "-in".into(), text(&f.dem.script), "-log".into(), text(&logs.join("liggghts.log"))]);
+    dem.extend(f.dem.variables.iter().flat_map(|(k, v)| ["-var".to_string(), k.clone(), v.clone()]));
+    let mut cfd = mpirun(f.run.cfd_ranks, &[&session, &foam]);
+    let solver = if f.fluid.solver == "voidageFoam" { text(&home.solver) } else { f.fluid.solver.clone() };
+    cfd.extend([solver, "-case".into(), text(&config.fluid_case())]);
+    if f.run.cfd_ranks > 1 {
+        cfd.push("-parallel".into());
+    }
+    let group = |name, command, log: &str| Group { name, command, cwd: config.folder.clone(), log: logs.join(log) };
+    let plan = [group("couple", couple, "couple.log"), group("dem", dem, "dem.log"), group("cfd", cfd, "cfd.log")];
+    let mut groups = Groups::start(&plan)?;
+    let outcome = watch(config, &mut groups, stop);
+    groups.end();
+    Ok(outcome)
+}
+
+/// Waits for the end, whichever comes.
+fn watch(config: &Config, groups: &mut Groups, stop: &AtomicBool) -> Outcome {
+    let mut ui = ui::Ui::new(config);
+    loop {
+        for line in groups.lines() {
+            ui.line(&line);
+        }
+        if stop.load(Ordering::Relaxed) {
+            ui.finish();
+            return Outcome::Interrupted;
+        }
+        groups.look();
+        if let Some(first) = groups.failed() {
+            let begin = Instant::now();
+            // the others learn of it from the coupler and end by themselves
+            while groups.running() > 0 && begin.elapsed() < GRACE && !stop.load(Ordering::Relaxed) {
+                std::thread::sleep(Duration::from_millis(50));
+                groups.look();
+            }
+            for line in groups.lines() {
+                ui.line(&line);
+            }
+            ui.finish();
+            return Outcome::Failed(groups.reason(first, ui.error.as_deref()));
+        }
+        if groups.running() == 0 {
+            for line in groups.lines() {
+                ui.line(&line);
+            }
+            ui.finish();
+            return Outcome::Complete;
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}

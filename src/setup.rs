@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! From a case to the objects of a run: methods by name, settings for the partners, agreement of the programs.
+
+use crate::config::{Config, Feedback, Flow, GravityTreatment, InInterval, Model};
+use crate::couple::Snapshot;
+use crate::interpolate::FluidVelocity;
+use crate::map::Mapping;
+use crate::mesh::Mesh;
+use crate::partners::Partners;
+use crate::smooth::{self, Smoother};
+use crate::step::Setup;
+use crate::{forces, map, scheme};
+use voidage_wire::{Transport, Welcome};
+
+/// The step's settings.
+pub fn setup(c: &Config) -> Result<Setup, String> {
+    let f = &c.file;
+    let unknown = |what: &str, name: &str| format!("{what} = \"{name}\" is not known");
+    let archimedes = f.fluid.gravity_treatment == GravityTreatment::Archimedes;
+    let model_a = f.coupling.model == Model::A;
+    Ok(Setup {
+        drag: forces::by_name(&f.forces.drag).ok_or_else(|| unknown("forces.drag", &f.forces.drag))?,
+        scheme: scheme::by_name(&f.coupling.scheme).ok_or_else(|| unknown("coupling.scheme", &f.coupling.scheme))?,
+        fluid_velocity: FluidVelocity::by_name(&f.interpolate.fluid_velocity)
+            .ok_or_else(|| unknown("interpolate.fluid_velocity", &f.interpolate.fluid_velocity))?,
+        model_b: !model_a,
+        two_way: f.coupling.feedback == Feedback::TwoWay,
+        pressure_force: model_a && f.forces.pressure_gradient,
+        archimedes: if archimedes { f.fluid.gravity } else { [0.0; 3] },
+        mean_pressure_gradient: if model_a { f.fluid.mean_pressure_gradient } else { [0.0; 3] },
+        density: f.fluid.density,
+        kinematic_viscosity: f.fluid.kinematic_viscosity,
+        period: c.period(),
+        voidage_min: f.limits.voidage_min,
+        exclude_outside: f.limits.outside == "exclude",
+    })
+}
+
+/// The mapping by name.
+pub fn mapping(c: &Config) -> Result<Box<dyn Mapping>, String> {
+    let name = &c.file.map.method;
+    map::all().into_iter().find(|m| m.name() == name).ok_or_else(|| format!("map.method = \"{name}\" is not known"))
+}
+
+/// The smoother asked for and the positive one for redone steps.
+pub fn smoothers(c: &Config, mesh: &Mesh) -> Result<[Box<dyn Smoother>; 2], String> {
+    let s = &c.file.smooth;
+    let make = |name: &str| smooth::by_name(name, mesh, s.bandwidth, s.tolerance);
+    let positive = if s.method == "none" { "none" } else { "uniformization" };
+    let unknown = || format!("smooth.method = \"{}\" is not known", s.method);
+    Ok([make(&s.method).ok_or_else(unknown)?, make(positive).ok_or_else(unknown)?])
+}
+
+/// What the partners are told (names in `docs/wire.md`).
+pub fn welcome(c: &Config) -> Welcome {
+    let f = &c.file;
+    let yes = f64::from;
+    let mut w = Welcome::default();
+    let mut set = |k: &str, v: f64| w.settings.insert(k.into(), v);
+    set("dem.time_step", f.dem.time_step);
+    set("dem.explicit_limit", 0.2);
+    set("dem.constant_force", yes(f.dem.force == InInterval::Constant));
+    set("coupling.interval", f64::from(f.coupling.interval));
+    set("fluid.density", f.fluid.density);
+    set("fluid.kinematic_viscosity", f.fluid.kinematic_viscosity);
+    set("fluid.time_step", c.period());
+    let model_a = f.coupling.model == Model::A;
+    set("fluid.model", if model_a { 1.0 } else { 2.0 });
+    set("fluid.continuity", yes(f.coupling.continuity == crate::config::Continuity::SolidsFlux));
+    set("fluid.two_way", yes(f.coupling.feedback == Feedback::TwoWay));
+    set("fluid.frozen", yes(f.fluid.flow == Flow::Frozen));
+    let in_pressure = f.fluid.gravity_treatment == GravityTreatment::InPressure;
+    for (a, axis) in ["x", "y", "z"].iter().enumerate() {
+        set(&format!("fluid.mean_pressure_gradient.{axis}"), f.fluid.mean_pressure_gradient[a]);
+        set(&format!("fluid.gravity.{axis}"), if in_pressure { f.fluid.gravity[a] } else { 0.0 });
+    }
+    // what no force needs is not sent
+    set("send.pressure_gradient", yes(model_a && f.forces.pressure_gradient));
+    set("send.stress_divergence", yes(model_a && f.forces.viscous_stress));
+    w
+}
+
+/// The programs must agree on time steps; each says its own in its hello.
+pub fn agree<T: Transport>(c: &Config, partners: &Partners<T>) -> Result<(), String> {
+    for i in partners.dem().chain(partners.cfd()) {
+        let Some(h) = partners.hello(i) else { continue };
+        let dem = partners.dem().contains(&i);
+        let (wanted, key) = if dem {
+            (c.file.dem.time_step, "dem.time_step")
+        } else {
+            (c.period(), "dem.time_step x coupling.interval")
+        };
+        if (h.time_step / wanted - 1.0).abs() > 1e-9 {
+            return Err(format!(
+                "{} runs with a time step of {:e} s, {key} is {wanted:e} s: make them equal",
+                h.program, h.time_step
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// What is written at the fluid's write times.
+pub fn writer(c: &Config) -> Box<dyn FnMut(&Snapshot) -> std::io::Result<()>> {
+    let _ = c;
+    Box::new(|_| Ok(()))
+}
+
+/// CPU time of this process, s.
+pub fn cpu_seconds() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let rest = stat.rfind(')').map_or("", |i| &stat[i + 2..]);
+    let ticks: f64 = rest.split(' ').skip(11).take(2).filter_map(|x| x.parse::<f64>().ok()).sum();
+    ticks / 100.0
+}
