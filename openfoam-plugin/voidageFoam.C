@@ -11,9 +11,9 @@
 #include "fvCFD.H"
 #include "fvOptions.H"
 #include "pimpleControl.H"
+#include "wallFvPatch.H"
 #include "singlePhaseTransportModel.H"
 #include "turbulentTransportModel.H"
-#include "CorrectPhi.H"
 #include "link.H"
 #include "sources.H"
 
