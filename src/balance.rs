@@ -41,7 +41,8 @@ mod tests {
 
     #[test]
     fn an_unbalanced_book_shows() {
-        let mut b = Books { charged: [2.0, 0.0, 0.0], reaction: [2.0, 0.0, 0.0], scale: 2.0, ..Books::default() };
+        let mut b =
+            Books { charged: [2.0, 0.0, 0.0], reaction: [2.0, 0.0, 0.0], scale: 2.0, ..Books::default() };
         assert_eq!(b.error(None), 0.0);
         assert_eq!(b.error(Some([2.2, 0.0, 0.0])), 0.10000000000000009);
         b.external = [0.5, 0.0, 0.0];

@@ -12,10 +12,13 @@ pub struct World {
 impl World {
     /// Initialises MPI; refuses more than one coupler rank.
     pub fn join() -> Result<Self, String> {
-        let universe = mpi::initialize().ok_or("MPI could not be initialised (is it initialised already?)")?;
+        let universe =
+            mpi::initialize().ok_or("MPI could not be initialised (is it initialised already?)")?;
         match universe.world().size() {
             1 => Ok(Self { _universe: universe }),
-            n => Err(format!("{n} coupler ranks were started, this version works with 1: use `mpirun -np 1`")),
+            n => {
+                Err(format!("{n} coupler ranks were started, this version works with 1: use `mpirun -np 1`"))
+            }
         }
     }
 }

@@ -27,7 +27,9 @@ pub const INTERRUPTED: u8 = 130;
 
 fn overrides(set: &[String]) -> Result<Vec<(String, String)>, Vec<Problem>> {
     let split = |s: &String| {
-        let bad = || vec![Problem::error("--set", s, "overrides are section.key=value", "--set smooth.bandwidth=3e-3")];
+        let bad = || {
+            vec![Problem::error("--set", s, "overrides are section.key=value", "--set smooth.bandwidth=3e-3")]
+        };
         let (k, v) = s.split_once('=').ok_or_else(bad)?;
         Ok((k.trim().to_string(), v.trim().to_string()))
     };
@@ -95,7 +97,11 @@ pub fn run(case: &Path, into: Option<&Path>, set: &[String]) -> u8 {
     let begin = Instant::now();
     match launch::run(&config, &stop) {
         Ok(Outcome::Complete) => {
-            println!("complete in {:.1} s; results in {}", begin.elapsed().as_secs_f64(), config.folder.display());
+            println!(
+                "complete in {:.1} s; results in {}",
+                begin.elapsed().as_secs_f64(),
+                config.folder.display()
+            );
             OK
         }
         Ok(Outcome::Interrupted) => {
@@ -127,9 +133,11 @@ pub fn couple(case: &Path, resolved: bool) -> u8 {
 fn coupled(case: &Path, resolved: bool) -> Result<(), String> {
     let _world = crate::comm::World::join()?;
     let session = Session::from_environment()?;
-    let mut config = config::load(case, &[]).map_err(|p| p.iter().map(|p| format!("{p}\n")).collect::<String>())?;
+    let mut config =
+        config::load(case, &[]).map_err(|p| p.iter().map(|p| format!("{p}\n")).collect::<String>())?;
     if resolved {
-        let text = std::fs::read_to_string(case.join("logs/case.resolved.toml")).map_err(|e| e.to_string())?;
+        let text =
+            std::fs::read_to_string(case.join("logs/case.resolved.toml")).map_err(|e| e.to_string())?;
         config.file = toml::from_str::<CaseFile>(&text).map_err(|e| e.to_string())?;
     }
     let hub = Hub::join(&session).map_err(|e| e.to_string())?;
@@ -172,7 +180,13 @@ fn exchange(
             said = Some(Instant::now());
             println!(
                 "@progress step={} time={} dem={:.4} cfd={:.4} coupler={:.4} action={:e} solid={:e}",
-                row.step, row.time, s.wait_dem, s.wait_cfd, s.coupler, s.worst_action_reaction, s.worst_solid_volume
+                row.step,
+                row.time,
+                s.wait_dem,
+                s.wait_cfd,
+                s.coupler,
+                s.worst_action_reaction,
+                s.worst_solid_volume
             );
         }
     };
@@ -195,7 +209,14 @@ fn exchange(
     println!(
         "@summary {} exchanges to t = {} s: waiting for DEM {:.2} s, for CFD {:.2} s, coupler {:.2} s ({cpu:.2} s CPU)\t\
          largest errors: action-reaction {:.1e}, solid volume {:.1e}; excluded {}, redone with the positive smoother {}",
-        s.steps, s.time, s.wait_dem, s.wait_cfd, s.coupler, s.worst_action_reaction, s.worst_solid_volume, s.excluded,
+        s.steps,
+        s.time,
+        s.wait_dem,
+        s.wait_cfd,
+        s.coupler,
+        s.worst_action_reaction,
+        s.worst_solid_volume,
+        s.excluded,
         s.redone
     );
     Ok(())
@@ -207,7 +228,8 @@ pub fn explain(topic: &str) -> u8 {
     match topic {
         "case" => {
             for (key, unit, default, text) in config::KEYS {
-                let default = if *default == "-" { "must be given".into() } else { format!("default {default}") };
+                let default =
+                    if *default == "-" { "must be given".into() } else { format!("default {default}") };
                 row(key, unit, &format!("{text} ({default})"));
             }
         }
@@ -225,7 +247,8 @@ pub fn version() -> u8 {
     println!("voidage {}, wire protocol {PROTOCOL}", env!("CARGO_PKG_VERSION"));
     for package in ["openfoam", "liggghts", "lammps"] {
         let out = std::process::Command::new("dpkg-query").args(["-W", "-f", "${Version}", package]).output();
-        let found = out.ok().filter(|o| o.status.success()).map(|o| String::from_utf8_lossy(&o.stdout).into_owned());
+        let found =
+            out.ok().filter(|o| o.status.success()).map(|o| String::from_utf8_lossy(&o.stdout).into_owned());
         println!("{package}: {}", found.unwrap_or_else(|| "not installed as a package".into()));
     }
     match launch::companions() {

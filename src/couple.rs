@@ -168,7 +168,8 @@ impl<T: Transport> Exchange<'_, T> {
             }
             if write {
                 let snapshot = Snapshot { k, time, particles: &particles, step: &self.step, fluid: &fluid };
-                (self.write)(&snapshot).map_err(|source| CoupleError::File { what: "write fields", source })?;
+                (self.write)(&snapshot)
+                    .map_err(|source| CoupleError::File { what: "write fields", source })?;
             }
             let mut o = self.open_row(k, time, &particles, &mut summary);
             o.row.wait_dem = wait_dem.as_secs_f64();
@@ -193,7 +194,9 @@ impl<T: Transport> Exchange<'_, T> {
         if got == due {
             return Ok(());
         }
-        Err(CoupleError::OutOfStep(format!("{who} is at exchange {got}, {due} is due: fluid and DEM are out of step")))
+        Err(CoupleError::OutOfStep(format!(
+            "{who} is at exchange {got}, {due} is due: fluid and DEM are out of step"
+        )))
     }
 
     fn receive_particles(&mut self, k: i64) -> Result<Particles, CoupleError> {
@@ -247,7 +250,8 @@ impl<T: Transport> Exchange<'_, T> {
         for (piece, i) in self.partners.cfd().enumerate() {
             let (slots, s) = (&self.step.mesh.slots[piece], &self.step.sources);
             let n = slots.len();
-            let scalars = [(field::VOIDAGE, &s.voidage), (field::VOIDAGE_OLD, &s.voidage_old), (field::SP, &s.sp)];
+            let scalars =
+                [(field::VOIDAGE, &s.voidage), (field::VOIDAGE_OLD, &s.voidage_old), (field::SP, &s.sp)];
             let vectors = [(field::SOLIDS_FLUX, &s.solids_flux), (field::SU, &s.su)];
             let mut blocks: Vec<_> = scalars.iter().map(|f| Block::f64s(f.0, n)).collect();
             blocks.extend(vectors.iter().map(|f| Block::f64s(f.0, 3 * n)));

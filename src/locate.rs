@@ -25,6 +25,8 @@ pub struct Locator {
     bins: [usize; 3],
     seed: Vec<u32>,
     planar: bool,
+    /// distance a point may lie outside a boundary face of a cell, m
+    tolerance: Vec<f64>,
 }
 
 /// Distance a point may lie outside a boundary face, relative to the cell size: rounding only.
@@ -44,7 +46,15 @@ impl Locator {
         let size = (extent.iter().product::<f64>() / mesh.len() as f64).cbrt();
         let bins = extent.map(|e| ((e / size).round() as usize).clamp(1, 1000));
         let bin = [0, 1, 2].map(|a| extent[a] / bins[a] as f64);
-        let mut l = Self { lower, bin, bins, seed: vec![NONE; bins.iter().product()], planar: planar(mesh) };
+        let tolerance = mesh.volume.iter().map(|v| BOUNDARY * v.cbrt()).collect();
+        let mut l = Self {
+            lower,
+            bin,
+            bins,
+            seed: vec![NONE; bins.iter().product()],
+            planar: planar(mesh),
+            tolerance,
+        };
         for (slot, c) in mesh.centre.iter().enumerate() {
             let b = l.bin_of(*c);
             if l.seed[b] == NONE {
@@ -69,7 +79,7 @@ impl Locator {
         for (index, (x, h)) in position.iter_mut().zip(host.iter_mut()).enumerate() {
             let guess = if self.planar && *h != NONE { *h } else { self.seed[self.bin_of(*x)] };
             let mut y = *x;
-            *h = match walk(mesh, guess, &mut y) {
+            *h = match self.walk(mesh, guess, &mut y) {
                 Walk::Found(slot) => slot,
                 Walk::Boundary(patch) => match search(mesh, *x, &mut y) {
                     Some(slot) => slot,
@@ -101,32 +111,34 @@ fn beyond(side: &crate::mesh::Side, x: &[f64; 3]) -> (f64, bool) {
     (side.sign * s, leaves)
 }
 
-fn walk(mesh: &Mesh, from: u32, x: &mut [f64; 3]) -> Walk {
-    let mut cell = from;
-    for _ in 0..1000 {
-        let tolerance = BOUNDARY * mesh.volume[cell as usize].cbrt();
-        let (mut inner, mut wall) = (None::<(f64, usize)>, None::<u32>);
-        for (i, side) in mesh.sides(cell as usize).iter().enumerate() {
-            let (distance, leaves) = beyond(side, x);
-            if side.across == NONE {
-                if distance > tolerance {
-                    wall = wall.or(Some(side.patch));
+impl Locator {
+    fn walk(&self, mesh: &Mesh, from: u32, x: &mut [f64; 3]) -> Walk {
+        let mut cell = from;
+        for _ in 0..1000 {
+            let tolerance = self.tolerance[cell as usize];
+            let (mut inner, mut wall) = (None::<(f64, usize)>, None::<u32>);
+            for (i, side) in mesh.sides(cell as usize).iter().enumerate() {
+                let (distance, leaves) = beyond(side, x);
+                if side.across == NONE {
+                    if distance > tolerance {
+                        wall = wall.or(Some(side.patch));
+                    }
+                } else if leaves && inner.is_none_or(|b| distance > b.0) {
+                    inner = Some((distance, i));
                 }
-            } else if leaves && inner.is_none_or(|b| distance > b.0) {
-                inner = Some((distance, i));
+            }
+            match (inner, wall) {
+                (Some((_, i)), _) => {
+                    let side = mesh.sides(cell as usize)[i];
+                    cell = side.across;
+                    (0..3).for_each(|a| x[a] += side.shift[a]);
+                }
+                (None, Some(patch)) => return Walk::Boundary(patch),
+                (None, None) => return Walk::Found(cell),
             }
         }
-        match (inner, wall) {
-            (Some((_, i)), _) => {
-                let side = mesh.sides(cell as usize)[i];
-                cell = side.across;
-                (0..3).for_each(|a| x[a] += side.shift[a]);
-            }
-            (None, Some(patch)) => return Walk::Boundary(patch),
-            (None, None) => return Walk::Found(cell),
-        }
+        Walk::Failed
     }
-    Walk::Failed
 }
 
 /// The cell of lowest id that holds `x` or one of its periodic images, by looking at all cells.

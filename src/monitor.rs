@@ -11,7 +11,11 @@ pub const COLUMNS: &[(&str, &str, &str)] = &[
     ("time_s", "s", "physical time of the fluid at the end of the step"),
     ("particles", "1", "particles coupled"),
     ("solid_fraction_max", "1", "largest solid volume fraction of a cell"),
-    ("solid_volume_error", "1", "|sum of eps_s V over the cells - sum of particle volumes| / sum of particle volumes"),
+    (
+        "solid_volume_error",
+        "1",
+        "|sum of eps_s V over the cells - sum of particle volumes| / sum of particle volumes",
+    ),
     ("solid_momentum_error", "1", "same for the particles' momentum, relative to sum of m |v|"),
     (
         "action_reaction_error",

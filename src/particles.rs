@@ -85,13 +85,7 @@ impl Particles {
     /// Merges the messages of all DEM ranks (in rank order).
     pub fn receive(frames: &[Frame]) -> Result<Self, ParticleError> {
         let ids = frames.iter().map(|f| f.i64s(field::ID)).collect::<Result<Vec<_>, _>>()?;
-        let mut order = Vec::with_capacity(ids.iter().map(|i| i.len()).sum());
-        for (rank, list) in ids.iter().enumerate() {
-            order.extend(list.iter().enumerate().map(|(k, id)| (*id, rank as u32, k as u32)));
-        }
-        if !order.is_sorted() {
-            order.sort_unstable();
-        }
+        let order = in_order(&ids);
         if let Some(w) = order.windows(2).find(|w| w[0].0 == w[1].0) {
             return Err(ParticleError::Duplicate { id: w[0].0, first: w[0].1, second: w[1].1 });
         }
@@ -132,7 +126,9 @@ impl Particles {
                 () if !finite(&self.position[i]) => format!("position {:?}", self.position[i]),
                 () if !finite(&self.velocity[i]) => format!("velocity {:?}", self.velocity[i]),
                 () if !finite(&self.ledger[i]) => format!("ledger {:?}", self.ledger[i]),
-                () if !(self.radius[i] > 0.0 && self.radius[i].is_finite()) => format!("radius {}", self.radius[i]),
+                () if !(self.radius[i] > 0.0 && self.radius[i].is_finite()) => {
+                    format!("radius {}", self.radius[i])
+                }
                 () if !(self.mass[i] > 0.0 && self.mass[i].is_finite()) => format!("mass {}", self.mass[i]),
                 () => continue,
             };
@@ -140,6 +136,36 @@ impl Particles {
         }
         Ok(())
     }
+}
+
+/// (id, rank, position) by id. Ids are nearly dense as a rule: then by counting, else by sorting.
+fn in_order(ids: &[&[i64]]) -> Vec<(i64, u32, u32)> {
+    let all = || {
+        let of_rank = |(rank, list): (usize, &&[i64])| {
+            let list: Vec<_> = list.iter().enumerate().map(|(k, id)| (*id, rank as u32, k as u32)).collect();
+            list
+        };
+        ids.iter().enumerate().flat_map(of_rank)
+    };
+    let n: usize = ids.iter().map(|i| i.len()).sum();
+    let (low, high) = all().fold((i64::MAX, i64::MIN), |(l, h), p| (l.min(p.0), h.max(p.0)));
+    let span = i128::from(high) - i128::from(low);
+    if n > 0 && span < 4 * n as i128 {
+        let mut place = vec![(0, u32::MAX, 0); span as usize + 1];
+        let mut twice = false;
+        for p in all() {
+            let slot = &mut place[(p.0 - low) as usize];
+            twice |= slot.1 != u32::MAX;
+            *slot = p;
+        }
+        if !twice {
+            place.retain(|p| p.1 != u32::MAX);
+            return place;
+        }
+    }
+    let mut order: Vec<_> = all().collect();
+    order.sort_unstable();
+    order
 }
 
 #[cfg(test)]

@@ -32,7 +32,9 @@ pub enum PartnerError {
         waiting: String,
     },
     /// Nothing came in time.
-    #[error("{who} sent no {what} for {seconds:.0} s: it is stalled, or limits.wait = {seconds:.0} s is too short for one step")]
+    #[error(
+        "{who} sent no {what} for {seconds:.0} s: it is stalled, or limits.wait = {seconds:.0} s is too short for one step"
+    )]
     Silent {
         /// role and rank
         who: String,
@@ -96,7 +98,13 @@ impl<T: Transport> Partners<T> {
     pub fn new(dem: Vec<T>, cfd: Vec<T>, limit: Duration) -> Self {
         let dem_ranks = dem.len();
         let partner = |role| {
-            move |(rank, transport): (usize, T)| Partner { transport, role, rank: rank as u32, hello: None, pending: None }
+            move |(rank, transport): (usize, T)| Partner {
+                transport,
+                role,
+                rank: rank as u32,
+                hello: None,
+                pending: None,
+            }
         };
         let list = dem.into_iter().enumerate().map(partner(Role::Dem));
         let list = list.chain(cfd.into_iter().enumerate().map(partner(Role::Cfd))).collect();
@@ -120,7 +128,12 @@ impl<T: Transport> Partners<T> {
     }
 
     /// Waits for all hellos of the run `token`. `launched` tells whether whoever started the run still lives.
-    pub fn meet(&mut self, token: &str, limit: Duration, launched: impl Fn() -> bool) -> Result<(), PartnerError> {
+    pub fn meet(
+        &mut self,
+        token: &str,
+        limit: Duration,
+        launched: impl Fn() -> bool,
+    ) -> Result<(), PartnerError> {
         let start = Instant::now();
         for i in 0..self.list.len() {
             while self.list[i].hello.is_none() {
@@ -132,16 +145,24 @@ impl<T: Transport> Partners<T> {
                     return Err(PartnerError::Stranger { who, what: "`voidage run` has ended".into() });
                 }
                 let sample = self.list[i].transport.receive(LOOK);
-                if let Some(s) = sample.map_err(|source| PartnerError::Transport { who: who.clone(), source })? {
-                    let frame = Frame::parse(&s).map_err(|source| PartnerError::Wire { who: who.clone(), source })?;
+                if let Some(s) =
+                    sample.map_err(|source| PartnerError::Transport { who: who.clone(), source })?
+                {
+                    let frame =
+                        Frame::parse(&s).map_err(|source| PartnerError::Wire { who: who.clone(), source })?;
                     if frame.kind() == kind::FAIL {
                         return Err(PartnerError::GaveUp { who, reason: frame.text() });
                     }
                     let stranger = |what: String| PartnerError::Stranger { who: who.clone(), what };
-                    let bytes = frame.expect(kind::HELLO).and_then(|()| frame.bytes(voidage_wire::field::TEXT));
-                    let h: Hello = hello::decode(bytes.map_err(|e| stranger(e.to_string()))?).map_err(stranger)?;
+                    let bytes =
+                        frame.expect(kind::HELLO).and_then(|()| frame.bytes(voidage_wire::field::TEXT));
+                    let h: Hello =
+                        hello::decode(bytes.map_err(|e| stranger(e.to_string()))?).map_err(stranger)?;
                     if h.token != token || h.role != self.list[i].role || h.rank != self.list[i].rank {
-                        return Err(stranger(format!("a hello of run {}, {:?} rank {}", h.token, h.role, h.rank)));
+                        return Err(stranger(format!(
+                            "a hello of run {}, {:?} rank {}",
+                            h.token, h.role, h.rank
+                        )));
                     }
                     self.list[i].hello = Some(h);
                 }
@@ -155,7 +176,8 @@ impl<T: Transport> Partners<T> {
     pub fn welcome(&mut self, i: usize, settings: &Welcome) -> Result<(), PartnerError> {
         let frame = frame::text_frame(kind::WELCOME, 0, &hello::encode(settings));
         let who = self.who(i);
-        send_copy(&mut self.list[i].transport, &frame).map_err(|source| PartnerError::Transport { who, source })
+        send_copy(&mut self.list[i].transport, &frame)
+            .map_err(|source| PartnerError::Transport { who, source })
     }
 
     /// Error if any partner but `except` gave up, or any has died.
@@ -255,7 +277,17 @@ mod tests {
 
     fn hello(role: Role, rank: u32, process: Process) -> Vec<u64> {
         let program = "test".into();
-        let h = Hello { token: "t".into(), role, rank, size: 1, time_step: 1.0, step: 0, time: 0.0, program, process };
+        let h = Hello {
+            token: "t".into(),
+            role,
+            rank,
+            size: 1,
+            time_step: 1.0,
+            step: 0,
+            time: 0.0,
+            program,
+            process,
+        };
         frame::text_frame(kind::HELLO, 0, &hello::encode(&h))
     }
 

@@ -20,7 +20,8 @@ pub fn setup(c: &Config) -> Result<Setup, String> {
     let model_a = f.coupling.model == Model::A;
     Ok(Setup {
         drag: forces::by_name(&f.forces.drag).ok_or_else(|| unknown("forces.drag", &f.forces.drag))?,
-        scheme: scheme::by_name(&f.coupling.scheme).ok_or_else(|| unknown("coupling.scheme", &f.coupling.scheme))?,
+        scheme: scheme::by_name(&f.coupling.scheme)
+            .ok_or_else(|| unknown("coupling.scheme", &f.coupling.scheme))?,
         fluid_velocity: FluidVelocity::by_name(&f.interpolate.fluid_velocity)
             .ok_or_else(|| unknown("interpolate.fluid_velocity", &f.interpolate.fluid_velocity))?,
         model_b: !model_a,
@@ -39,7 +40,10 @@ pub fn setup(c: &Config) -> Result<Setup, String> {
 /// The mapping by name.
 pub fn mapping(c: &Config) -> Result<Box<dyn Mapping>, String> {
     let name = &c.file.map.method;
-    map::all().into_iter().find(|m| m.name() == name).ok_or_else(|| format!("map.method = \"{name}\" is not known"))
+    map::all()
+        .into_iter()
+        .find(|m| m.name() == name)
+        .ok_or_else(|| format!("map.method = \"{name}\" is not known"))
 }
 
 /// The smoother asked for and the positive one for redone steps.

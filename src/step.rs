@@ -15,7 +15,7 @@ use crate::map::{Mapping, Weights};
 use crate::mesh::Mesh;
 use crate::particles::Particles;
 use crate::scheme::Scheme;
-use crate::smooth::Smoother;
+use crate::smooth::{Active, Smoother};
 use crate::sums::{norm, sum, sum3};
 use thiserror::Error;
 
@@ -83,7 +83,9 @@ pub enum StepError {
         voidage: f64,
     },
     /// A number that is not one.
-    #[error("{what} is not a finite number in cell {cell} (centre {centre:?} m): the fluid solver has gone wrong")]
+    #[error(
+        "{what} is not a finite number in cell {cell} (centre {centre:?} m): the fluid solver has gone wrong"
+    )]
     NotFinite {
         /// which field
         what: &'static str,
@@ -155,6 +157,7 @@ pub struct CouplingStep {
     smoother: Box<dyn Smoother>,
     positive: Box<dyn Smoother>,
     weights: Weights,
+    active: Active,
     hosts: Vec<u32>,
     host_ids: Vec<i64>,
     coupled: Vec<bool>,
@@ -194,6 +197,7 @@ impl CouplingStep {
             smoother,
             positive,
             weights: Weights::default(),
+            active: Active::default(),
             hosts: Vec::new(),
             host_ids: Vec::new(),
             coupled: Vec::new(),
@@ -230,6 +234,8 @@ impl CouplingStep {
         std::mem::swap(&mut self.sources.voidage, &mut self.sources.voidage_old);
         self.use_positive = false;
         loop {
+            let degree = self.smoother().degree();
+            self.active.update(&self.mesh, &self.weights.cell, degree);
             self.smooth_solids(p);
             let fits = self.lanes.iter().all(|l| l[0] >= 0.0) && (first || self.sources_of(p));
             if fits || self.use_positive {
@@ -257,7 +263,8 @@ impl CouplingStep {
         }
         self.coupled.clear();
         self.coupled.resize(p.len(), true);
-        let lost = self.locator.locate(&self.mesh, &mut p.position, &mut self.hosts).err().unwrap_or_default();
+        let lost =
+            self.locator.locate(&self.mesh, &mut p.position, &mut self.hosts).err().unwrap_or_default();
         for Lost { index, position, near } in lost {
             if !self.setup.exclude_outside {
                 let near = near.map(|n| format!(" (nearest patch {n})")).unwrap_or_default();
@@ -274,6 +281,11 @@ impl CouplingStep {
         if self.use_positive { &mut *self.positive } else { &mut *self.smoother }
     }
 
+    fn smooth(&mut self, lanes: &mut [Lanes]) {
+        let smoother = if self.use_positive { &mut self.positive } else { &mut self.smoother };
+        smoother.apply(lanes, &self.active);
+    }
+
     /// Stage 4 (pass a): ε_s in lane 0, ε_s U_s in lanes 1–3.
     fn smooth_solids(&mut self, p: &Particles) {
         let mut lanes = std::mem::take(&mut self.lanes);
@@ -282,14 +294,15 @@ impl CouplingStep {
             let (v, u) = (p.volume(i), p.velocity[i]);
             [v, v * u[0], v * u[1], v * u[2], 0.0, 0.0, 0.0, 0.0]
         });
-        self.smoother().apply(&mut lanes);
+        self.smooth(&mut lanes);
         self.lanes = lanes;
         let total = sum((0..p.len()).filter(|i| self.coupled[*i]).map(|i| p.volume(i)));
         let found = sum(self.lanes.iter().zip(&self.mesh.volume).map(|(l, v)| l[0] * v));
         self.facts.solid_volume_error = ratio((found - total).abs(), total);
         let part = |i: usize| p.velocity[i].map(|u| p.volume(i) * u);
         let total = sum3((0..p.len()).filter(|i| self.coupled[*i]).map(part));
-        let found = sum3(self.lanes.iter().zip(&self.mesh.volume).map(|(l, v)| [l[1] * v, l[2] * v, l[3] * v]));
+        let found =
+            sum3(self.lanes.iter().zip(&self.mesh.volume).map(|(l, v)| [l[1] * v, l[2] * v, l[3] * v]));
         let scale = sum((0..p.len()).filter(|i| self.coupled[*i]).map(|i| norm(part(i))));
         let gap = [0, 1, 2].map(|a| found[a] - total[a]);
         self.facts.solid_momentum_error = ratio(norm(gap), scale);
@@ -324,8 +337,10 @@ impl CouplingStep {
         let mut lanes = std::mem::take(&mut self.lanes_b);
         lanes.fill([0.0; 8]);
         let (predicted, period) = (&self.predicted, self.setup.period);
-        self.weights.deposit(&self.mesh, &mut lanes, |i| linearise(&predicted[i], p.velocity[i], p.ledger[i], period));
-        self.smoother().apply(&mut lanes);
+        self.weights.deposit(&self.mesh, &mut lanes, |i| {
+            linearise(&predicted[i], p.velocity[i], p.ledger[i], period)
+        });
+        self.smooth(&mut lanes);
         let positive = lanes.iter().all(|l| l[0] >= 0.0);
         for (j, l) in lanes.iter().enumerate() {
             self.sources.sp[j] = l[0];
@@ -344,11 +359,19 @@ impl CouplingStep {
                 self.predicted.push(Predicted::default());
                 continue;
             }
-            let voidage = (1.0 - self.weights.gather(&self.lanes, i)[0]).max(s.voidage_min.max(f64::MIN_POSITIVE));
+            let voidage =
+                (1.0 - self.weights.gather(&self.lanes, i)[0]).max(s.voidage_min.max(f64::MIN_POSITIVE));
             let g = self.weights.gather(&self.gathered, i);
             let gathered = [g[0], g[1], g[2]];
             let host = self.hosts[i] as usize;
-            let u = interpolate::fluid_velocity(s.fluid_velocity, &self.mesh, &self.fluid, host, p.position[i], gathered);
+            let u = interpolate::fluid_velocity(
+                s.fluid_velocity,
+                &self.mesh,
+                &self.fluid,
+                host,
+                p.position[i],
+                gathered,
+            );
             let slip = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
             let mut k = s.drag.drag_coefficient(&Slip {
                 diameter: 2.0 * p.radius[i],
@@ -397,7 +420,8 @@ impl CouplingStep {
             let charged = if first {
                 [0.0; 3]
             } else {
-                [0, 1, 2].map(|a| s.period * (q.implicit * (u[a] - p.velocity[i][a]) + q.explicit[a] + force[a]))
+                [0, 1, 2]
+                    .map(|a| s.period * (q.implicit * (u[a] - p.velocity[i][a]) + q.explicit[a] + force[a]))
             };
             d.drag_coefficient.push(q.drag_coefficient);
             d.velocity.push(u);
@@ -423,13 +447,18 @@ impl CouplingStep {
             let q = [0, 1, 2].map(|a| grad(&fluid.pressure_gradient, a) - grad(&fluid.stress_divergence, a));
             self.fluid[j] = [u[0], u[1], u[2], q[0], q[1], q[2], 0.0, 0.0];
             if let Some(a) = (0..6).find(|a| !self.fluid[j][*a].is_finite()) {
-                let what = if a < 3 { "the fluid velocity" } else { "the pressure gradient or stress divergence" };
-                return Err(StepError::NotFinite { what, cell: self.mesh.ids[j], centre: self.mesh.centre[j] });
+                let what =
+                    if a < 3 { "the fluid velocity" } else { "the pressure gradient or stress divergence" };
+                return Err(StepError::NotFinite {
+                    what,
+                    cell: self.mesh.ids[j],
+                    centre: self.mesh.centre[j],
+                });
             }
         }
         let mut gathered = std::mem::take(&mut self.gathered);
         gathered.clone_from(&self.fluid);
-        self.smoother().apply(&mut gathered);
+        self.smooth(&mut gathered);
         self.gathered = gathered;
         Ok(())
     }

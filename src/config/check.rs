@@ -11,20 +11,36 @@ pub fn check(c: &Config) -> Vec<Problem> {
     times(c, &mut p);
     let script = script::read(&c.script(), &c.file.dem.variables);
     match &script {
-        Err(e) => p.push(Problem::error("dem.script", c.file.dem.script.display(), e, "set dem.script to the LIGGGHTS script")),
+        Err(e) => p.push(Problem::error(
+            "dem.script",
+            c.file.dem.script.display(),
+            e,
+            "set dem.script to the LIGGGHTS script",
+        )),
         Ok(s) => dem(c, s, &mut p),
     }
     let case = c.fluid_case();
     if let Some(nu) = foam::viscosity(&case)
         && (nu / c.file.fluid.kinematic_viscosity - 1.0).abs() > 1e-6
     {
-        let accepted = format!("constant/transportProperties has nu {nu}; drag and flow need the same viscosity");
+        let accepted =
+            format!("constant/transportProperties has nu {nu}; drag and flow need the same viscosity");
         let given = c.file.fluid.kinematic_viscosity;
-        p.push(Problem::error("fluid.kinematic_viscosity", given, &accepted, format!("fluid.kinematic_viscosity = {nu:e}")));
+        p.push(Problem::error(
+            "fluid.kinematic_viscosity",
+            given,
+            &accepted,
+            format!("fluid.kinematic_viscosity = {nu:e}"),
+        ));
     }
     if !case.join("constant/polyMesh/points").exists() && !case.join("system/blockMeshDict").exists() {
         let accepted = "the case has neither constant/polyMesh nor system/blockMeshDict";
-        p.push(Problem::error("fluid.case", c.file.fluid.case.display(), accepted, "make the mesh first, e.g. blockMesh"));
+        p.push(Problem::error(
+            "fluid.case",
+            c.file.fluid.case.display(),
+            accepted,
+            "make the mesh first, e.g. blockMesh",
+        ));
     }
     if let (Some(mesh), Ok(s)) = (foam::extent(&case), &script) {
         meshes(c, &mesh, s, &mut p);
@@ -61,7 +77,12 @@ fn values(c: &Config, p: &mut Vec<Problem>) {
         }
     }
     if f.coupling.interval == 0 {
-        p.push(Problem::error("coupling.interval", 0, "a number of DEM steps, at least 1", "coupling.interval = 20"));
+        p.push(Problem::error(
+            "coupling.interval",
+            0,
+            "a number of DEM steps, at least 1",
+            "coupling.interval = 20",
+        ));
     }
 }
 
@@ -71,11 +92,22 @@ fn models(c: &Config, p: &mut Vec<Problem>) {
     let two_way = f.coupling.feedback == Feedback::TwoWay;
     if f.coupling.model == Model::A && two_way && !(f.forces.pressure_gradient && f.forces.viscous_stress) {
         let accepted = "model A gives the particles their share of grad p and div tau; without it action is not reaction";
-        p.push(Problem::error("forces", "pressure_gradient or viscous_stress = false", accepted, "set both to true, or coupling.model = \"B\""));
+        p.push(Problem::error(
+            "forces",
+            "pressure_gradient or viscous_stress = false",
+            accepted,
+            "set both to true, or coupling.model = \"B\"",
+        ));
     }
     if stock && (f.coupling.model == Model::A || f.forces.viscous_stress) {
-        let fix = "coupling.model = \"B\" and forces.viscous_stress = false, or fluid.solver = \"voidageFoam\"";
-        p.push(Problem::error("fluid.solver", &f.fluid.solver, "a stock solver knows no voidage: model B only", fix));
+        let fix =
+            "coupling.model = \"B\" and forces.viscous_stress = false, or fluid.solver = \"voidageFoam\"";
+        p.push(Problem::error(
+            "fluid.solver",
+            &f.fluid.solver,
+            "a stock solver knows no voidage: model B only",
+            fix,
+        ));
     }
     let moving = f.fluid.gravity.iter().any(|g| *g != 0.0);
     if f.fluid.gravity_treatment == GravityTreatment::InPressure && !moving {
@@ -83,23 +115,41 @@ fn models(c: &Config, p: &mut Vec<Problem>) {
         p.push(Problem::error("fluid.gravity_treatment", "in-pressure", "needs a gravity", fix));
     }
     if f.fluid.gravity_treatment == GravityTreatment::InPressure && stock {
-        let accepted = "only voidageFoam has gravity in the pressure; with the Archimedes force it would act twice";
-        p.push(Problem::error("fluid.gravity_treatment", "in-pressure", accepted, "gravity_treatment = \"archimedes\""));
+        let accepted =
+            "only voidageFoam has gravity in the pressure; with the Archimedes force it would act twice";
+        p.push(Problem::error(
+            "fluid.gravity_treatment",
+            "in-pressure",
+            accepted,
+            "gravity_treatment = \"archimedes\"",
+        ));
     }
     if f.dem.force == InInterval::Constant {
         let accepted = "a constant force over the interval errs by K Δt/(2 m)";
-        p.push(Problem::warning("dem.force", "constant", accepted, "dem.force = \"implicit\" is as fast and exact"));
+        p.push(Problem::warning(
+            "dem.force",
+            "constant",
+            accepted,
+            "dem.force = \"implicit\" is as fast and exact",
+        ));
     }
 }
 
 fn times(c: &Config, p: &mut Vec<Problem>) {
     let (period, step) = (c.period(), c.control.step);
     if c.control.adjustable {
-        p.push(Problem::error("adjustTimeStep", "yes", "the coupling needs a fixed fluid step", "controlDict: adjustTimeStep no;"));
+        p.push(Problem::error(
+            "adjustTimeStep",
+            "yes",
+            "the coupling needs a fixed fluid step",
+            "controlDict: adjustTimeStep no;",
+        ));
     }
     if (step / period - 1.0).abs() > 1e-9 {
         let n = (step / c.file.dem.time_step).round();
-        let accepted = format!("the fluid step (controlDict deltaT {step}) must be interval x dem.time_step = {period:e}");
+        let accepted = format!(
+            "the fluid step (controlDict deltaT {step}) must be interval x dem.time_step = {period:e}"
+        );
         let fix = if n >= 1.0 && (step / (n * c.file.dem.time_step) - 1.0).abs() < 1e-9 {
             format!("coupling.interval = {n}")
         } else {
@@ -128,7 +178,12 @@ fn dem(c: &Config, s: &script::Script, p: &mut Vec<Problem>) {
     }
     if !s.has_fix {
         let accepted = "the script has no `fix ... voidage`: nothing would be coupled";
-        p.push(Problem::error("dem.script", c.file.dem.script.display(), accepted, "add: fix voidage all voidage"));
+        p.push(Problem::error(
+            "dem.script",
+            c.file.dem.script.display(),
+            accepted,
+            "add: fix voidage all voidage",
+        ));
     }
     if !s.has_run {
         let accepted = "the script has no `run`";
@@ -136,12 +191,22 @@ fn dem(c: &Config, s: &script::Script, p: &mut Vec<Problem>) {
     }
     if let Some(r) = s.radius {
         if !(1e-8..=1.0).contains(&r) {
-            p.push(Problem::error("radius", r, "between 1e-8 and 1 m: are the units right?", "give lengths in m"));
+            p.push(Problem::error(
+                "radius",
+                r,
+                "between 1e-8 and 1 m: are the units right?",
+                "give lengths in m",
+            ));
         }
         let b = c.file.smooth.bandwidth;
         if c.file.smooth.method != "none" && b < 2.0 * r {
             let fix = format!("smooth.bandwidth = {:e}", 8.0 * r);
-            p.push(Problem::warning("smooth.bandwidth", b, "below one particle diameter: the voidage follows single particles", fix));
+            p.push(Problem::warning(
+                "smooth.bandwidth",
+                b,
+                "below one particle diameter: the voidage follows single particles",
+                fix,
+            ));
         }
         if let Some(rho) = s.density {
             relaxation(c, r, rho, p);
@@ -155,8 +220,14 @@ fn relaxation(c: &Config, radius: f64, density: f64, p: &mut Vec<Problem>) {
     let tau = density * (2.0 * radius).powi(2) / (18.0 * mu);
     let x = c.period() / tau;
     if c.file.coupling.scheme == "explicit" && x > 1.0 {
-        let accepted = format!("the fluid step is {x:.2} relaxation times (R eq. 9): explicit coupling is unstable");
-        p.push(Problem::error("coupling.scheme", "explicit", &accepted, "coupling.scheme = \"conservative\""));
+        let accepted =
+            format!("the fluid step is {x:.2} relaxation times (R eq. 9): explicit coupling is unstable");
+        p.push(Problem::error(
+            "coupling.scheme",
+            "explicit",
+            &accepted,
+            "coupling.scheme = \"conservative\"",
+        ));
     }
     if c.file.dem.force == InInterval::Constant && x > 0.01 {
         let accepted = format!("the constant force errs by {:.1} % of the drag (limit 0.5 %)", 50.0 * x);
@@ -165,11 +236,18 @@ fn relaxation(c: &Config, radius: f64, density: f64, p: &mut Vec<Problem>) {
 }
 
 fn meshes(c: &Config, mesh: &foam::Extent, s: &script::Script, p: &mut Vec<Problem>) {
-    let size = mesh.cells.map(|n| ((0..3).map(|a| mesh.upper[a] - mesh.lower[a]).product::<f64>() / n as f64).cbrt());
+    let size = mesh
+        .cells
+        .map(|n| ((0..3).map(|a| mesh.upper[a] - mesh.lower[a]).product::<f64>() / n as f64).cbrt());
     let b = c.file.smooth.bandwidth;
     if let Some(h) = size.filter(|h| c.file.smooth.method != "none" && b < 0.5 * h) {
         let accepted = format!("less than half the mean cell size {h:.3e} m: smoothing does almost nothing");
-        p.push(Problem::warning("smooth.bandwidth", b, &accepted, "smooth.method = \"none\", or a larger bandwidth"));
+        p.push(Problem::warning(
+            "smooth.bandwidth",
+            b,
+            &accepted,
+            "smooth.method = \"none\", or a larger bandwidth",
+        ));
     }
     let Some((lower, upper)) = s.domain else { return };
     for a in 0..3 {
@@ -184,9 +262,15 @@ fn meshes(c: &Config, mesh: &foam::Extent, s: &script::Script, p: &mut Vec<Probl
             let fix = "make both boxes equal in periodic directions";
             p.push(Problem::error(&format!("DEM box in {axis}"), given, &accepted, fix));
         } else if !periodic && (lower[a] > mesh.upper[a] || upper[a] < mesh.lower[a]) {
-            p.push(Problem::error(&format!("DEM box in {axis}"), given, &accepted, "they do not overlap: are the units right?"));
+            p.push(Problem::error(
+                &format!("DEM box in {axis}"),
+                given,
+                &accepted,
+                "they do not overlap: are the units right?",
+            ));
         } else if !periodic && (lower[a] < mesh.lower[a] - slack || upper[a] > mesh.upper[a] + slack) {
-            let fix = "particles that leave the mesh stop the run; limits.outside = \"exclude\" leaves them out";
+            let fix =
+                "particles that leave the mesh stop the run; limits.outside = \"exclude\" leaves them out";
             p.push(Problem::warning(&format!("DEM box in {axis}"), given, &accepted, fix));
         }
     }

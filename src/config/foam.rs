@@ -29,7 +29,11 @@ fn plain(text: &str) -> String {
     let (mut out, mut rest) = (String::new(), text);
     while let Some(i) = rest.find("//").into_iter().chain(rest.find("/*")).min() {
         out.push_str(&rest[..i]);
-        let end = if rest[i..].starts_with("//") { rest[i..].find('\n') } else { rest[i..].find("*/").map(|e| e + 2) };
+        let end = if rest[i..].starts_with("//") {
+            rest[i..].find('\n')
+        } else {
+            rest[i..].find("*/").map(|e| e + 2)
+        };
         rest = end.map_or("", |e| &rest[i + e..]);
         out.push(' ');
     }
@@ -124,7 +128,8 @@ mod tests {
 
     #[test]
     fn entries_are_found_past_comments() {
-        let text = "/* deltaT 3; */ // deltaT 4;\nFoamFile { version 2; }\nstartTime 0; endTime\n0.4; deltaT 2e-4;";
+        let text =
+            "/* deltaT 3; */ // deltaT 4;\nFoamFile { version 2; }\nstartTime 0; endTime\n0.4; deltaT 2e-4;";
         assert_eq!(number(text, "deltaT"), Some(2e-4));
         assert_eq!(number(text, "endTime"), Some(0.4));
         assert_eq!(number("nu [0 2 -1 0 0 0 0] 1e-5;", "nu"), Some(1e-5));

@@ -41,11 +41,21 @@ pub struct Problem {
 }
 
 impl Problem {
-    pub(crate) fn error(place: &str, given: impl fmt::Display, accepted: &str, fix: impl fmt::Display) -> Self {
+    pub(crate) fn error(
+        place: &str,
+        given: impl fmt::Display,
+        accepted: &str,
+        fix: impl fmt::Display,
+    ) -> Self {
         let (place, given) = (place.into(), given.to_string());
         Self { severity: Severity::Error, place, given, accepted: accepted.into(), fix: fix.to_string() }
     }
-    pub(crate) fn warning(place: &str, given: impl fmt::Display, accepted: &str, fix: impl fmt::Display) -> Self {
+    pub(crate) fn warning(
+        place: &str,
+        given: impl fmt::Display,
+        accepted: &str,
+        fix: impl fmt::Display,
+    ) -> Self {
         Self { severity: Severity::Warning, ..Self::error(place, given, accepted, fix) }
     }
 }

@@ -281,7 +281,12 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("fluid.density", "kg/m3", "-", "density of the fluid"),
     ("fluid.kinematic_viscosity", "m2/s", "-", "must equal nu of transportProperties"),
     ("fluid.gravity", "m/s2", "-", "gravity as in the DEM script, for Archimedes or in-pressure"),
-    ("fluid.gravity_treatment", "", "archimedes", "archimedes (force on particles) | in-pressure (eps rho g in the fluid) | none"),
+    (
+        "fluid.gravity_treatment",
+        "",
+        "archimedes",
+        "archimedes (force on particles) | in-pressure (eps rho g in the fluid) | none",
+    ),
     ("fluid.mean_pressure_gradient", "Pa/m", "[0,0,0]", "prescribed mean gradient, for periodic boxes"),
     ("fluid.flow", "", "solved", "solved | frozen"),
     ("dem.program", "", "liggghts", "particle program"),
@@ -299,7 +304,12 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("smooth.bandwidth", "m", "-", "b of the Gaussian exp(-r2/b2); 4 to 6 particle diameters"),
     ("smooth.tolerance", "", "1e-4", "error of the smoothing operator"),
     ("interpolate.fluid_velocity", "", "gather", "gather | host-cell | linear"),
-    ("forces.drag", "", "-", "stokes schiller-naumann di-felice gidaspow beetstra syamlal-obrien koch-hill wen-yu none"),
+    (
+        "forces.drag",
+        "",
+        "-",
+        "stokes schiller-naumann di-felice gidaspow beetstra syamlal-obrien koch-hill wen-yu none",
+    ),
     ("forces.pressure_gradient", "", "true", "-V grad p on the particles (model A)"),
     ("forces.viscous_stress", "", "true", "V div tau on the particles (model A)"),
     ("output.fields", "", "true", "cell fields for ParaView at the fluid's write times"),
@@ -354,7 +364,8 @@ pub(super) fn parse(text: &str, overrides: &[(String, String)]) -> Result<CaseFi
 fn set(table: &mut toml::Table, key: &str, value: &str) -> Result<(), Vec<Problem>> {
     let parsed = toml::from_str::<toml::Table>(&format!("x = {value}")).ok().and_then(|mut t| t.remove("x"));
     let value = parsed.unwrap_or_else(|| toml::Value::String(value.into()));
-    let bad = || vec![Problem::error(key, &value, "overrides are section.key=value", "see `voidage explain`")];
+    let bad =
+        || vec![Problem::error(key, &value, "overrides are section.key=value", "see `voidage explain`")];
     let (path, last) = key.rsplit_once('.').ok_or_else(bad)?;
     let mut at = table;
     for part in path.split('.') {
@@ -389,7 +400,8 @@ fn names(file: &CaseFile) -> Vec<Problem> {
     let mut problems = Vec::new();
     let mut check = |key: &str, given: &str, list: Vec<&str>| {
         if !list.contains(&given) {
-            let near = nearest(given, list.iter().copied()).map(|n| format!("{key} = \"{n}\"?")).unwrap_or_default();
+            let near =
+                nearest(given, list.iter().copied()).map(|n| format!("{key} = \"{n}\"?")).unwrap_or_default();
             let accepted = format!("accepted: {}", list.join(", "));
             let fix = if near.is_empty() { format!("{key} = \"{}\"", list[0]) } else { near };
             problems.push(Problem::error(key, format!("\"{given}\""), &accepted, fix));

@@ -6,7 +6,9 @@
 
 mod drag;
 
-pub use drag::{Beetstra, DiFelice, Gidaspow, KochHill, NoDrag, SchillerNaumann, Stokes, SyamlalOBrien, WenYu};
+pub use drag::{
+    Beetstra, DiFelice, Gidaspow, KochHill, NoDrag, SchillerNaumann, Stokes, SyamlalOBrien, WenYu,
+};
 
 /// What a drag law looks at; SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,7 +83,8 @@ mod tests {
             if *name == "wen-yu" && n[1] <= 0.8 {
                 continue; // Ergun there
             }
-            let s = Slip { diameter: n[0], voidage: n[1], speed: n[2], kinematic_viscosity: n[3], density: n[4] };
+            let s =
+                Slip { diameter: n[0], voidage: n[1], speed: n[2], kinematic_viscosity: n[3], density: n[4] };
             let k = by_name(name).unwrap().drag_coefficient(&s);
             // the reference code adds 1e-15 m2/s to ν in Re: 1e-10 at ν = 1e-5
             let tolerance = 1e-10 + 1.1e-15 / n[3];
@@ -106,7 +109,8 @@ mod tests {
         ];
         for (name, expected) in expected {
             let law = by_name(name).unwrap();
-            let slip = |u| Slip { diameter: 1e-4, voidage: 1.0, speed: u, kinematic_viscosity: 1e-5, density: 10.0 };
+            let slip =
+                |u| Slip { diameter: 1e-4, voidage: 1.0, speed: u, kinematic_viscosity: 1e-5, density: 10.0 };
             let weight = std::f64::consts::PI / 6.0 * 1e-12 * (3000.0 - 10.0) * 9.81;
             let (mut low, mut high) = (0.0, 1.0);
             for _ in 0..100 {
@@ -121,7 +125,8 @@ mod tests {
     fn finite_at_zero_slip_and_smooth_towards_it() {
         for law in all() {
             for voidage in [0.35, 0.5, 0.7, 0.9, 1.0] {
-                let slip = |speed| Slip { diameter: 1e-3, voidage, speed, kinematic_viscosity: 1e-5, density: 1.2 };
+                let slip =
+                    |speed| Slip { diameter: 1e-3, voidage, speed, kinematic_viscosity: 1e-5, density: 1.2 };
                 let (zero, small) = (law.drag_coefficient(&slip(0.0)), law.drag_coefficient(&slip(1e-13)));
                 assert!(zero.is_finite() && zero >= 0.0, "{} {voidage}: {zero}", law.name());
                 assert!((zero - small).abs() <= 1e-4 * zero, "{} {voidage}: {zero} {small}", law.name());

@@ -111,7 +111,9 @@ impl Groups {
     pub fn reason(&self, first: usize, coupler: Option<&str>) -> String {
         let g = &self.list[first];
         let how = match g.status {
-            Some(s) if s.signal().is_some() => format!("was killed by signal {}", s.signal().unwrap_or_default()),
+            Some(s) if s.signal().is_some() => {
+                format!("was killed by signal {}", s.signal().unwrap_or_default())
+            }
             // mpirun reports a rank's signal as 128 + number
             Some(s) if s.code().is_some_and(|c| c > 128) => {
                 format!("was killed by signal {}", s.code().unwrap_or_default() - 128)
@@ -187,7 +189,8 @@ mod tests {
 
     fn start(scripts: [&str; 2]) -> Groups {
         let folder = std::env::temp_dir();
-        let log = |i: usize| folder.join(format!("voidage-groups-{}-{i}-{:p}.log", std::process::id(), scripts[0]));
+        let log =
+            |i: usize| folder.join(format!("voidage-groups-{}-{i}-{:p}.log", std::process::id(), scripts[0]));
         let group = |i: usize| Group {
             name: ["couple", "dem"][i],
             command: ["sh", "-c", scripts[i]].map(String::from).to_vec(),
@@ -208,7 +211,10 @@ mod tests {
 
     #[test]
     fn who_fails_first_is_named_and_grandchildren_are_ended() {
-        let mut g = start(["echo '@error DEM rank 0 has died'; (sleep 1000 & wait)", "sleep 0.3; echo ERROR: lost atoms; exit 3"]);
+        let mut g = start([
+            "echo '@error DEM rank 0 has died'; (sleep 1000 & wait)",
+            "sleep 0.3; echo ERROR: lost atoms; exit 3",
+        ]);
         wait(&mut g, |g| g.failed().is_some());
         assert_eq!(g.failed(), Some(1));
         let reason = g.reason(1, None);

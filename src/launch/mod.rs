@@ -60,9 +60,9 @@ pub fn companions() -> Result<Companions, String> {
 
 fn mpirun(ranks: u32, export: &[&str]) -> Vec<String> {
     let mut c = vec!["mpirun".to_string()];
-    let root = std::os::unix::fs::MetadataExt::uid(&std::fs::metadata("/proc/self").ok().unwrap_or_else(|| {
-        unreachable!("/proc is there on Linux")
-    })) == 0;
+    let root = std::os::unix::fs::MetadataExt::uid(
+        &std::fs::metadata("/proc/self").ok().unwrap_or_else(|| unreachable!("/proc is there on Linux")),
+    ) == 0;
     if root {
         c.push("--allow-run-as-root".into());
     }
@@ -92,7 +92,13 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<Outcome, String> {
     result
 }
 
-fn start(config: &Config, home: &Companions, s: &Session, logs: &Path, stop: &AtomicBool) -> Result<Outcome, String> {
+fn start(
+    config: &Config,
+    home: &Companions,
+    s: &Session,
+    logs: &Path,
+    stop: &AtomicBool,
+) -> Result<Outcome, String> {
     let f = &config.file;
     let session = format!("{}={}", session::VARIABLE, s.file().display());
     let foam = std::env::var("WM_PROJECT_DIR").unwrap_or_else(|_| "/usr/share/openfoam".into());
@@ -103,7 +109,13 @@ fn start(config: &Config, home: &Companions, s: &Session, logs: &Path, stop: &At
     let mut couple = mpirun(1, &[&session]);
     couple.extend([text(&home.voidage), "couple".into(), text(&config.folder), "--resolved".into()]);
     let mut dem = mpirun(f.run.dem_ranks, &[&session, &preload]);
-    dem.extend([f.dem.program.clone(), "-in".into(), text(&f.dem.script), "-log".into(), text(&logs.join("liggghts.log"))]);
+    dem.extend([
+        f.dem.program.clone(),
+        "-in".into(),
+        text(&f.dem.script),
+        "-log".into(),
+        text(&logs.join("liggghts.log")),
+    ]);
     dem.extend(f.dem.variables.iter().flat_map(|(k, v)| ["-var".to_string(), k.clone(), v.clone()]));
     let mut cfd = mpirun(f.run.cfd_ranks, &[&session, &foam]);
     let solver = if f.fluid.solver == "voidageFoam" { text(&home.solver) } else { f.fluid.solver.clone() };
@@ -111,8 +123,10 @@ fn start(config: &Config, home: &Companions, s: &Session, logs: &Path, stop: &At
     if f.run.cfd_ranks > 1 {
         cfd.push("-parallel".into());
     }
-    let group = |name, command, log: &str| Group { name, command, cwd: config.folder.clone(), log: logs.join(log) };
-    let plan = [group("couple", couple, "couple.log"), group("dem", dem, "dem.log"), group("cfd", cfd, "cfd.log")];
+    let group =
+        |name, command, log: &str| Group { name, command, cwd: config.folder.clone(), log: logs.join(log) };
+    let plan =
+        [group("couple", couple, "couple.log"), group("dem", dem, "dem.log"), group("cfd", cfd, "cfd.log")];
     let mut groups = Groups::start(&plan)?;
     let outcome = watch(config, &mut groups, stop);
     groups.end();

@@ -16,7 +16,8 @@ pub fn copy(from: &Path, to: &Path) -> Result<(), String> {
     for entry in fs::read_dir(from).map_err(fail)? {
         let entry = entry.map_err(fail)?;
         let name = entry.file_name().to_string_lossy().into_owned();
-        let result = ["logs", "monitor.csv", "voidage", "post"].contains(&&*name) || name.starts_with("processor");
+        let result =
+            ["logs", "monitor.csv", "voidage", "post"].contains(&&*name) || name.starts_with("processor");
         if result || entry.path().canonicalize().ok() == to.canonicalize().ok() {
             continue;
         }

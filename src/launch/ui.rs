@@ -24,7 +24,11 @@ impl Ui {
     pub fn new(config: &Config) -> Self {
         let terminal = std::io::stderr().is_terminal();
         let bar = ProgressBar::new(config.steps());
-        bar.set_draw_target(if terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() });
+        bar.set_draw_target(if terminal {
+            ProgressDrawTarget::stderr()
+        } else {
+            ProgressDrawTarget::hidden()
+        });
         let style = "{bar:30} {pos}/{len} steps, {eta} left | {msg}";
         bar.set_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
         let now = Instant::now();

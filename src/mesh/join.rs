@@ -24,12 +24,14 @@ pub fn assemble(pieces: &[MeshPiece]) -> Result<Mesh, MeshError> {
     let mut patch_names: Vec<String> = Vec::new();
     let mut loops: Vec<Vec<Vec<V>>> = vec![Vec::new(); n];
     for (rank, piece) in pieces.iter().enumerate() {
-        let corner = |f: usize| -> Vec<V> { piece.face(f).iter().map(|p| piece.points[*p as usize]).collect() };
-        let mut put = |cell: u32, face: Face, owner: bool, across: u32, patch: u32, shift: V, points: Vec<V>| {
-            let slot = slots[rank][cell as usize] as usize;
-            halves[slot].push(Half { face, across, patch, shift, outward: owner != face.reversed });
-            loops[slot].push(points);
-        };
+        let corner =
+            |f: usize| -> Vec<V> { piece.face(f).iter().map(|p| piece.points[*p as usize]).collect() };
+        let mut put =
+            |cell: u32, face: Face, owner: bool, across: u32, patch: u32, shift: V, points: Vec<V>| {
+                let slot = slots[rank][cell as usize] as usize;
+                halves[slot].push(Half { face, across, patch, shift, outward: owner != face.reversed });
+                loops[slot].push(points);
+            };
         for f in 0..piece.neighbour.len() {
             let (points, owner, neighbour) = (corner(f), piece.owner[f], piece.neighbour[f]);
             let face = geometry::face(&points);
@@ -39,7 +41,8 @@ pub fn assemble(pieces: &[MeshPiece]) -> Result<Mesh, MeshError> {
         }
         for (index, patch) in piece.patches.iter().enumerate() {
             let boundary = matches!(patch.kind, PatchKind::Boundary | PatchKind::Empty);
-            let number = if boundary && patch.size > 0 { name_of(&mut patch_names, &patch.name) } else { NONE };
+            let number =
+                if boundary && patch.size > 0 { name_of(&mut patch_names, &patch.name) } else { NONE };
             let other = if boundary { None } else { Some(across(pieces, rank, index)?) };
             for i in 0..patch.size {
                 let f = patch.start + i;
@@ -158,7 +161,8 @@ fn build(
             let by_centre = || a.face.centre.partial_cmp(&b.face.centre).unwrap_or(std::cmp::Ordering::Equal);
             key(a).cmp(&key(b)).then_with(by_centre)
         });
-        let outward = |h: &Half| (h.face.centre, if h.outward { h.face.area } else { scale(h.face.area, -1.0) });
+        let outward =
+            |h: &Half| (h.face.centre, if h.outward { h.face.area } else { scale(h.face.area, -1.0) });
         let faces: Vec<(V, V)> = list.iter().map(outward).collect();
         let (v, c) = geometry::cell(&faces);
         let gap = faces.iter().fold([0.0; 3], |s, f| add(s, f.1));

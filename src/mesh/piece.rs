@@ -62,7 +62,8 @@ pub struct MeshPiece {
 impl MeshPiece {
     /// Reads a MESH frame.
     pub fn from_frame(rank: usize, f: &Frame) -> Result<Self, WireError> {
-        let numbers = |name| -> Result<Vec<u32>, WireError> { Ok(f.i64s(name)?.iter().map(|x| *x as u32).collect()) };
+        let numbers =
+            |name| -> Result<Vec<u32>, WireError> { Ok(f.i64s(name)?.iter().map(|x| *x as u32).collect()) };
         let table = f.i64s(field::PATCHES)?;
         let n = table.len() / 5;
         let names = String::from_utf8_lossy(f.bytes(field::PATCH_NAMES)?).into_owned();

@@ -3,8 +3,8 @@
 //! a = T λ / 2. The degree follows from the tolerance (tail of the c_k); the truncated sum is scaled to
 //! Σ c_k = 1, which keeps constants and Σ V φ to rounding.
 
-use super::Smoother;
 use super::graph::Graph;
+use super::{Active, Smoother};
 use crate::mesh::Mesh;
 use crate::step::Lanes;
 
@@ -67,7 +67,7 @@ impl Smoother for Chebyshev {
     fn degree(&self) -> usize {
         self.coefficients.len() - 1
     }
-    fn apply(&mut self, lanes: &mut [Lanes]) {
+    fn apply(&mut self, lanes: &mut [Lanes], active: &Active) {
         let c = &self.coefficients;
         if c.len() == 1 {
             return;
@@ -75,19 +75,20 @@ impl Smoother for Chebyshev {
         let scale = 2.0 / self.graph.spectrum;
         // T_0 = φ, T_1 = X φ
         self.before.copy_from_slice(lanes);
-        for (i, out) in lanes.iter_mut().enumerate() {
+        self.now.fill([0.0; 8]);
+        for i in active.rows.iter().map(|i| *i as usize) {
             let flux = self.graph.row(i, &self.before);
+            let (own, now, out) = (&self.before[i], &mut self.now[i], &mut lanes[i]);
             for l in 0..8 {
-                let x = self.before[i][l] - scale * flux[l];
-                self.now[i][l] = x;
-                out[l] = c[0] * self.before[i][l] + c[1] * x;
+                now[l] = own[l] - scale * flux[l];
+                out[l] = c[0] * own[l] + c[1] * now[l];
             }
         }
         // T_{k+1} = 2 X T_k − T_{k−1}, written over T_{k−1}
         for ck in &c[2..] {
-            for (i, out) in lanes.iter_mut().enumerate() {
+            for i in active.rows.iter().map(|i| *i as usize) {
                 let flux = self.graph.row(i, &self.now);
-                let (now, next) = (&self.now[i], &mut self.before[i]);
+                let (now, next, out) = (&self.now[i], &mut self.before[i], &mut lanes[i]);
                 for l in 0..8 {
                     next[l] = 2.0 * (now[l] - scale * flux[l]) - next[l];
                     out[l] += ck * next[l];

@@ -33,7 +33,7 @@ impl Graph {
     }
 
     /// Σ_j a_ij (φ_i − φ_j) of one row, in slot order of the neighbours.
-    #[inline]
+    #[inline(always)]
     pub fn row(&self, i: usize, x: &[Lanes]) -> Lanes {
         let (own, mut sum) = (x[i], [0.0; 8]);
         for k in self.start[i] as usize..self.start[i + 1] as usize {

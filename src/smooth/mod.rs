@@ -5,10 +5,12 @@
 //! constants, keeps signs and is self-adjoint in the V inner product; every smoother says what it keeps.
 //! New smoothers implement `Smoother` and join `by_name`. Does not know particles.
 
+mod active;
 mod chebyshev;
 mod graph;
 mod uniformization;
 
+pub use active::Active;
 pub use chebyshev::Chebyshev;
 pub use uniformization::Uniformization;
 
@@ -23,8 +25,9 @@ pub trait Smoother {
     fn properties(&self) -> &'static str;
     /// Number of sweeps over the mesh per application.
     fn degree(&self) -> usize;
-    /// Smooths all lanes.
-    fn apply(&mut self, lanes: &mut [Lanes]);
+    /// Smooths all lanes. Fields that are zero outside the occupied cells come out as from a sweep over the
+    /// whole mesh, to the bit; of other fields only the values in occupied cells are smoothed.
+    fn apply(&mut self, lanes: &mut [Lanes], active: &Active);
 }
 
 /// No smoothing: cells much larger than the bandwidth.
@@ -40,7 +43,7 @@ impl Smoother for Unsmoothed {
     fn degree(&self) -> usize {
         0
     }
-    fn apply(&mut self, _: &mut [Lanes]) {}
+    fn apply(&mut self, _: &mut [Lanes], _: &Active) {}
 }
 
 /// Names in case.toml.

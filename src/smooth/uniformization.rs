@@ -2,8 +2,8 @@
 //! G by uniformization: exp(−T A) = Σ_k Poisson(qT; k) P^k, P = I − A/q, q = max A_ii. Every entry of P is
 //! ≥ 0, so the result keeps the sign and the range of the field on any mesh, by proof.
 
-use super::Smoother;
 use super::graph::Graph;
+use super::{Active, Smoother};
 use crate::mesh::Mesh;
 use crate::step::Lanes;
 
@@ -58,17 +58,24 @@ impl Smoother for Uniformization {
     fn degree(&self) -> usize {
         self.coefficients.len() - 1
     }
-    fn apply(&mut self, lanes: &mut [Lanes]) {
+    fn apply(&mut self, lanes: &mut [Lanes], active: &Active) {
         let c = &self.coefficients;
+        if c.len() == 1 {
+            return;
+        }
+        let share = 1.0 / (self.graph.diagonal * MARGIN);
         self.now.copy_from_slice(lanes);
-        lanes.iter_mut().for_each(|x| x.iter_mut().for_each(|x| *x *= c[0]));
+        self.next.fill([0.0; 8]);
+        for i in active.rows.iter().map(|i| *i as usize) {
+            lanes[i].iter_mut().for_each(|x| *x *= c[0]);
+        }
         for ck in &c[1..] {
-            for (i, out) in lanes.iter_mut().enumerate() {
+            for i in active.rows.iter().map(|i| *i as usize) {
                 let flux = self.graph.row(i, &self.now);
+                let (now, next, out) = (&self.now[i], &mut self.next[i], &mut lanes[i]);
                 for l in 0..8 {
-                    let x = self.now[i][l] - flux[l] / (self.graph.diagonal * MARGIN);
-                    self.next[i][l] = x;
-                    out[l] += ck * x;
+                    next[l] = now[l] - flux[l] * share;
+                    out[l] += ck * next[l];
                 }
             }
             std::mem::swap(&mut self.now, &mut self.next);
