@@ -190,7 +190,8 @@ fn exchange(
             );
         }
     };
-    let mut write = setup::writer(config);
+    let mut output = crate::output::Output::new(config).map_err(|e| format!("CASE/voidage: {e}"))?;
+    let mut write = |s: &crate::couple::Snapshot| output.write(s);
     let mut run = Exchange {
         partners: Partners::new(Vec::new(), Vec::new(), Duration::ZERO),
         step,
@@ -199,11 +200,12 @@ fn exchange(
         start: config.control.start,
         monitor,
         progress: &mut progress,
-        write: &mut *write,
+        write: &mut write,
     };
     std::mem::swap(&mut run.partners, partners);
     let result = run.run();
     std::mem::swap(&mut run.partners, partners);
+    output.finish().map_err(|e| format!("the animation: {e}"))?;
     let s = result.map_err(|e| e.to_string())?;
     let cpu = setup::cpu_seconds();
     println!(

@@ -35,5 +35,6 @@ pub mod comm;
 pub mod couple;
 pub mod launch;
 pub mod monitor;
+pub mod output;
 pub mod partners;
 pub mod setup;

@@ -115,6 +115,12 @@ impl Locator {
     fn walk(&self, mesh: &Mesh, from: u32, x: &mut [f64; 3]) -> Walk {
         let mut cell = from;
         for _ in 0..1000 {
+            // nearly always: strictly inside, no side needs a closer look
+            let deepest =
+                mesh.sides(cell as usize).iter().map(|s| beyond(s, x).0).fold(f64::NEG_INFINITY, f64::max);
+            if deepest < 0.0 {
+                return Walk::Found(cell);
+            }
             let tolerance = self.tolerance[cell as usize];
             let (mut inner, mut wall) = (None::<(f64, usize)>, None::<u32>);
             for (i, side) in mesh.sides(cell as usize).iter().enumerate() {

@@ -2,7 +2,6 @@
 //! From a case to the objects of a run: methods by name, settings for the partners, agreement of the programs.
 
 use crate::config::{Config, Feedback, Flow, GravityTreatment, InInterval, Model};
-use crate::couple::Snapshot;
 use crate::interpolate::FluidVelocity;
 use crate::map::Mapping;
 use crate::mesh::Mesh;
@@ -102,12 +101,6 @@ pub fn agree<T: Transport>(c: &Config, partners: &Partners<T>) -> Result<(), Str
         }
     }
     Ok(())
-}
-
-/// What is written at the fluid's write times.
-pub fn writer(c: &Config) -> Box<dyn FnMut(&Snapshot) -> std::io::Result<()>> {
-    let _ = c;
-    Box::new(|_| Ok(()))
 }
 
 /// CPU time of this process, s.

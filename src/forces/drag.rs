@@ -150,8 +150,9 @@ impl DragLaw for SyamlalOBrien {
     }
     fn drag_coefficient(&self, s: &Slip) -> f64 {
         let (e, re) = (s.voidage, s.reynolds());
-        let a = e.powf(4.14);
-        let b = if e <= 0.85 { 0.8 * e.powf(1.28) } else { e.powf(2.65) };
+        let log = e.ln(); // one logarithm for both powers
+        let a = (4.14 * log).exp();
+        let b = if e <= 0.85 { 0.8 * (1.28 * log).exp() } else { (2.65 * log).exp() };
         let v = 0.5 * (a - 0.06 * re + ((0.06 * re).powi(2) + 0.12 * re * (2.0 * b - a) + a * a).sqrt());
         let cd_u = (0.63 * re.sqrt() + 4.8 * v.sqrt()).powi(2) * s.kinematic_viscosity / s.diameter;
         s.volume() * e * 0.75 * cd_u * s.density / (s.diameter * v * v)

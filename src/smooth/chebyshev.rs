@@ -72,13 +72,33 @@ impl Smoother for Chebyshev {
         if c.len() == 1 {
             return;
         }
-        let scale = 2.0 / self.graph.spectrum;
-        // T_0 = φ, T_1 = X φ
         self.before.copy_from_slice(lanes);
         self.now.fill([0.0; 8]);
-        for i in active.rows.iter().map(|i| *i as usize) {
-            let flux = self.graph.row(i, &self.before);
-            let (own, now, out) = (&self.before[i], &mut self.now[i], &mut lanes[i]);
+        let (before, now) = (&mut self.before, &mut self.now);
+        pulp::Arch::new().dispatch(Sweeps { graph: &self.graph, c, rows: &active.rows, before, now, lanes });
+    }
+}
+
+/// All sweeps of one application, compiled for the vector unit at hand; lanes never mix, so bits do not differ.
+struct Sweeps<'a> {
+    graph: &'a Graph,
+    c: &'a [f64],
+    rows: &'a [u32],
+    before: &'a mut Vec<Lanes>,
+    now: &'a mut Vec<Lanes>,
+    lanes: &'a mut [Lanes],
+}
+
+impl pulp::NullaryFnOnce for Sweeps<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        let Self { graph, c, rows, before, now, lanes } = self;
+        let scale = 2.0 / graph.spectrum;
+        // T_0 = φ, T_1 = X φ
+        for i in rows.iter().map(|i| *i as usize) {
+            let flux = graph.row(i, before);
+            let (own, now, out) = (&before[i], &mut now[i], &mut lanes[i]);
             for l in 0..8 {
                 now[l] = own[l] - scale * flux[l];
                 out[l] = c[0] * own[l] + c[1] * now[l];
@@ -86,15 +106,15 @@ impl Smoother for Chebyshev {
         }
         // T_{k+1} = 2 X T_k − T_{k−1}, written over T_{k−1}
         for ck in &c[2..] {
-            for i in active.rows.iter().map(|i| *i as usize) {
-                let flux = self.graph.row(i, &self.now);
-                let (now, next, out) = (&self.now[i], &mut self.before[i], &mut lanes[i]);
+            for i in rows.iter().map(|i| *i as usize) {
+                let flux = graph.row(i, now);
+                let (now, next, out) = (&now[i], &mut before[i], &mut lanes[i]);
                 for l in 0..8 {
                     next[l] = 2.0 * (now[l] - scale * flux[l]) - next[l];
                     out[l] += ck * next[l];
                 }
             }
-            std::mem::swap(&mut self.before, &mut self.now);
+            std::mem::swap(before, now);
         }
     }
 }

@@ -104,7 +104,11 @@ pub unsafe extern "C" fn voidage_open(
 
 /// A number told by the coupler, e.g. "fluid.density"; 0 if known, negative if there is no such name.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn voidage_setting(link: *mut voidage_link, name: *const c_char, value: *mut f64) -> i32 {
+pub unsafe extern "C" fn voidage_setting(
+    link: *mut voidage_link,
+    name: *const c_char,
+    value: *mut f64,
+) -> i32 {
     guard(-1, || {
         // SAFETY: pointers as the header asks
         let (link, name) = unsafe { (body(link)?, text(name)?) };
@@ -248,7 +252,9 @@ mod tests {
             assert_eq!(voidage_send(none), -1);
             assert!(last().contains("voidage_open failed"));
             assert_eq!(voidage_receive(none), -1);
-            assert!(voidage_array(none, 1).is_null() && voidage_read(none, 1, std::ptr::null_mut()).is_null());
+            assert!(
+                voidage_array(none, 1).is_null() && voidage_read(none, 1, std::ptr::null_mut()).is_null()
+            );
             assert!(voidage_open(1, 0, 1, 1e-5, 0, 0.0, std::ptr::null()).is_null());
             assert!(last().contains("NULL"));
             assert!(voidage_open(7, 0, 1, 1e-5, 0, 0.0, c"x".as_ptr()).is_null());

@@ -8,7 +8,9 @@ use std::time::Duration;
 use voidage_shm::Hub;
 use voidage_shm::channel::{Channel, Loan, Received};
 use voidage_wire::transport::{send_copy, wait};
-use voidage_wire::{Block, Frame, Hello, Process, Role, Session, Transport, TransportError, Welcome, frame, hello, kind};
+use voidage_wire::{
+    Block, Frame, Hello, Process, Role, Session, Transport, TransportError, Welcome, frame, hello, kind,
+};
 
 /// The connection of this process.
 pub struct Link {
@@ -122,7 +124,11 @@ impl Link {
         let coupler = self.coupler;
         let peer: String = self.channel.peer().into();
         let check = || {
-            if coupler.is_alive() { Ok(()) } else { Err(TransportError::Died { peer: peer.clone(), pid: coupler.pid }) }
+            if coupler.is_alive() {
+                Ok(())
+            } else {
+                Err(TransportError::Died { peer: peer.clone(), pid: coupler.pid })
+            }
         };
         let sample = wait(&mut self.channel, self.limit, check).map_err(|e| e.to_string())?;
         let (kind, text) = {

@@ -73,14 +73,23 @@ impl Hub {
             let b = b.enable_safe_overflow(false).history_size(0).max_nodes(2);
             let b = b.subscriber_max_buffer_size(2).subscriber_max_borrowed_samples(1);
             let b = b.max_publishers(1).max_subscribers(1);
-            if server { b.create().map_err(system("make a channel")) } else { b.open().map_err(system("open a channel")) }
+            if server {
+                b.create().map_err(system("make a channel"))
+            } else {
+                b.open().map_err(system("open a channel"))
+            }
         };
         let event = |part: &str| {
             let b = self.node.service_builder(&name(part)?).event();
             let b = b.max_nodes(2).max_notifiers(1).max_listeners(1).event_id_max_value(1);
-            if server { b.create().map_err(system("make an event")) } else { b.open().map_err(system("open an event")) }
+            if server {
+                b.create().map_err(system("make an event"))
+            } else {
+                b.open().map_err(system("open an event"))
+            }
         };
-        let (up, down, up_event, down_event) = (data("up")?, data("down")?, event("up-event")?, event("down-event")?);
+        let (up, down, up_event, down_event) =
+            (data("up")?, data("down")?, event("up-event")?, event("down-event")?);
         let (out, inward, bell, ear) =
             if server { (down, up, down_event, up_event) } else { (up, down, up_event, down_event) };
         let publisher = out

@@ -83,7 +83,8 @@ pub fn clean_dead() -> io::Result<Vec<String>> {
 }
 
 fn is_old(path: &Path) -> bool {
-    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default().as_secs();
+    let now =
+        std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default().as_secs();
     std::fs::metadata(path).is_ok_and(|m| (m.mtime().max(0) as u64) + 60 < now)
 }
 

@@ -74,7 +74,9 @@ pub enum WireError {
     #[error("not a voidage message (first word {0:#018x})")]
     NotAFrame(u64),
     /// Other version.
-    #[error("protocol version {theirs}, this program speaks {ours}: install matching parts of voidage (./setup build)")]
+    #[error(
+        "protocol version {theirs}, this program speaks {ours}: install matching parts of voidage (./setup build)"
+    )]
     Version {
         /// version of the frame
         theirs: u32,
@@ -135,7 +137,8 @@ fn entry(frame: &[u64], i: usize) -> Result<(u32, ElementType, usize, std::ops::
     let count = usize::try_from(e[1]).map_err(|_| damaged("length"))?;
     let offset = usize::try_from(e[2]).map_err(|_| damaged("offset"))?;
     let words = if of == ElementType::U8 { count.div_ceil(8) } else { count };
-    let end = offset.checked_add(words).filter(|e| *e <= frame.len()).ok_or_else(|| damaged("beyond the end"))?;
+    let end =
+        offset.checked_add(words).filter(|e| *e <= frame.len()).ok_or_else(|| damaged("beyond the end"))?;
     Ok((e[0] as u32, of, count, offset..end))
 }
 
@@ -195,7 +198,11 @@ impl<'a> Frame<'a> {
     }
     /// All arrays in it.
     pub fn blocks(&self) -> impl Iterator<Item = Block> + '_ {
-        (0..self.n_blocks).filter_map(|i| entry(self.words, i).ok()).map(|(field, of, count, _)| Block { field, of, count })
+        (0..self.n_blocks).filter_map(|i| entry(self.words, i).ok()).map(|(field, of, count, _)| Block {
+            field,
+            of,
+            count,
+        })
     }
     fn find(&self, field: u32, of: ElementType) -> Result<(&'a [u64], usize), WireError> {
         let fail = |problem: &str| WireError::Array { kind: self.kind(), field, problem: problem.into() };
@@ -243,7 +250,11 @@ impl<'a> Frame<'a> {
     }
     /// Refuses any other kind.
     pub fn expect(&self, kind: u32) -> Result<(), WireError> {
-        if self.kind() == kind { Ok(()) } else { Err(WireError::Unexpected { got: self.kind(), expected: kind }) }
+        if self.kind() == kind {
+            Ok(())
+        } else {
+            Err(WireError::Unexpected { got: self.kind(), expected: kind })
+        }
     }
 }
 

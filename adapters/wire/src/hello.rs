@@ -58,7 +58,8 @@ pub struct Welcome {
 
 /// Encodes a handshake struct.
 pub fn encode<T: Serialize>(value: &T) -> Vec<u8> {
-    bincode::serde::encode_to_vec(value, bincode::config::standard()).expect("handshake structs always encode")
+    bincode::serde::encode_to_vec(value, bincode::config::standard())
+        .expect("handshake structs always encode")
 }
 
 /// Decodes a handshake struct; never takes more memory than 64 KiB.

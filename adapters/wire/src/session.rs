@@ -46,7 +46,13 @@ pub fn home() -> PathBuf {
 
 impl Session {
     /// Makes the private folder and `session.toml`. `wait`, `start` in s.
-    pub fn create(case: &Path, dem_ranks: u32, cfd_ranks: u32, wait: f64, start: f64) -> std::io::Result<Self> {
+    pub fn create(
+        case: &Path,
+        dem_ranks: u32,
+        cfd_ranks: u32,
+        wait: f64,
+        start: f64,
+    ) -> std::io::Result<Self> {
         let home = home();
         if !home.is_dir() {
             std::fs::DirBuilder::new().mode(0o700).recursive(true).create(&home)?;
@@ -124,7 +130,8 @@ impl Session {
 /// Writes a file so that a reader sees all of it or nothing; readable by the user alone.
 fn write_whole(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let part = file.with_extension("part");
-    let mut f = std::fs::OpenOptions::new().write(true).create(true).truncate(true).mode(0o600).open(&part)?;
+    let mut f =
+        std::fs::OpenOptions::new().write(true).create(true).truncate(true).mode(0o600).open(&part)?;
     f.write_all(bytes)?;
     std::fs::rename(&part, file)
 }
@@ -136,7 +143,10 @@ mod tests {
     #[test]
     fn a_session_is_private_unique_and_read_back() {
         use std::os::unix::fs::PermissionsExt;
-        let (a, b) = (Session::create(Path::new("/c"), 1, 2, 3.0, 4.0), Session::create(Path::new("/c"), 1, 2, 3.0, 4.0));
+        let (a, b) = (
+            Session::create(Path::new("/c"), 1, 2, 3.0, 4.0),
+            Session::create(Path::new("/c"), 1, 2, 3.0, 4.0),
+        );
         let (a, b) = (a.unwrap(), b.unwrap());
         assert_ne!(a.token, b.token);
         assert_eq!(Session::read(&a.file()).unwrap(), a);

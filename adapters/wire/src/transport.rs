@@ -87,7 +87,10 @@ pub fn wait<T: Transport>(
             return transport.receive(Duration::ZERO)?.ok_or(e);
         }
         if start.elapsed() >= limit {
-            return Err(TransportError::Silent { peer: transport.peer().into(), seconds: limit.as_secs_f64() });
+            return Err(TransportError::Silent {
+                peer: transport.peer().into(),
+                seconds: limit.as_secs_f64(),
+            });
         }
     }
 }

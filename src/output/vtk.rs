@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! VTK XML files with appended raw data: .vtu (cells as polyhedra), .vtp (points), .pvd (time series).
+
+use crate::mesh::Faces;
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// Values to write.
+pub enum Data<'a> {
+    /// one per cell or point
+    Scalar(&'a [f64]),
+    /// three per cell or point
+    Vector(&'a [[f64; 3]]),
+}
+
+/// A .pvd file and its parts.
+pub struct Series {
+    folder: PathBuf,
+    name: String,
+    parts: Vec<(f64, String)>,
+}
+
+impl Series {
+    /// FOLDER/NAME.pvd with parts FOLDER/NAME_0000.EXT.
+    pub fn new(folder: &Path, name: &str) -> Self {
+        Self { folder: folder.into(), name: name.into(), parts: Vec::new() }
+    }
+    /// Writes the next part and the list of all so far.
+    pub fn write(
+        &mut self,
+        time: f64,
+        ext: &str,
+        fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> io::Result<()> {
+        let part = format!("{}_{:04}.{ext}", self.name, self.parts.len());
+        let mut file = io::BufWriter::new(fs::File::create(self.folder.join(&part))?);
+        fill(&mut file)?;
+        file.flush()?;
+        self.parts.push((time, part));
+        let mut text = String::from(
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n",
+        );
+        for (t, p) in &self.parts {
+            text += &format!("<DataSet timestep=\"{t}\" file=\"{p}\"/>\n");
+        }
+        text += "</Collection>\n</VTKFile>\n";
+        // all or nothing for a reader that looks while we write
+        let file = self.folder.join(format!("{}.pvd", self.name));
+        fs::write(file.with_extension("part"), text)?;
+        fs::rename(file.with_extension("part"), file)
+    }
+}
+
+/// Appended blocks: header text with offsets, then the bytes.
+#[derive(Default)]
+struct Appended {
+    bytes: Vec<u8>,
+}
+
+impl Appended {
+    fn array(&mut self, name: &str, kind: &str, components: usize, data: &[u8]) -> String {
+        let offset = self.bytes.len();
+        self.bytes.extend((data.len() as u64).to_le_bytes());
+        self.bytes.extend(data);
+        format!(
+            "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"appended\" offset=\"{offset}\"/>\n"
+        )
+    }
+    fn integers(&mut self, name: &str, data: impl Iterator<Item = i64>) -> String {
+        let bytes: Vec<u8> = data.flat_map(i64::to_le_bytes).collect();
+        self.array(name, "Int64", 1, &bytes)
+    }
+    fn floats(&mut self, name: &str, data: &Data) -> String {
+        match data {
+            Data::Scalar(v) => {
+                let bytes: Vec<u8> = v.iter().flat_map(|x| (*x as f32).to_le_bytes()).collect();
+                self.array(name, "Float32", 1, &bytes)
+            }
+            Data::Vector(v) => {
+                let bytes: Vec<u8> = v.iter().flatten().flat_map(|x| (*x as f32).to_le_bytes()).collect();
+                self.array(name, "Float32", 3, &bytes)
+            }
+        }
+    }
+    fn finish(self, file: &mut dyn Write, kind: &str, body: &str) -> io::Result<()> {
+        write!(
+            file,
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" \
+             header_type=\"UInt64\">\n<{kind}>\n{body}</{kind}>\n<AppendedData encoding=\"raw\">\n_"
+        )?;
+        file.write_all(&self.bytes)?;
+        write!(file, "\n</AppendedData>\n</VTKFile>\n")
+    }
+}
+
+/// Cells with fields.
+pub fn cells(file: &mut dyn Write, mesh: &Faces, fields: &[(&str, Data)]) -> io::Result<()> {
+    let mut a = Appended::default();
+    let n = mesh.of_cell.len();
+    let corners: Vec<Vec<u32>> = mesh
+        .of_cell
+        .iter()
+        .map(|faces| {
+            let mut c: Vec<u32> = faces.iter().flatten().copied().collect();
+            c.sort_unstable();
+            c.dedup();
+            c
+        })
+        .collect();
+    let offsets = |lengths: Vec<usize>| {
+        lengths.into_iter().scan(0i64, |sum, l| {
+            *sum += l as i64;
+            Some(*sum)
+        })
+    };
+    let stream = |faces: &Vec<Vec<u32>>| 1 + faces.iter().map(|f| 1 + f.len()).sum::<usize>();
+    let mut body =
+        format!("<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{n}\">\n<Points>\n", mesh.points.len());
+    body += &a.floats("Points", &Data::Vector(&mesh.points));
+    body += "</Points>\n<Cells>\n";
+    body += &a.integers("connectivity", corners.iter().flatten().map(|p| i64::from(*p)));
+    body += &a.integers("offsets", offsets(corners.iter().map(Vec::len).collect()));
+    body += &a.array("types", "UInt8", 1, &vec![42; n]);
+    let faces = mesh.of_cell.iter().flat_map(|faces| {
+        let lists =
+            faces.iter().flat_map(|f| std::iter::once(f.len() as i64).chain(f.iter().map(|p| i64::from(*p))));
+        std::iter::once(faces.len() as i64).chain(lists)
+    });
+    body += &a.integers("faces", faces);
+    body += &a.integers("faceoffsets", offsets(mesh.of_cell.iter().map(stream).collect()));
+    body += "</Cells>\n<CellData>\n";
+    for (name, data) in fields {
+        body += &a.floats(name, data);
+    }
+    body += "</CellData>\n</Piece>\n";
+    a.finish(file, "UnstructuredGrid", &body)
+}
+
+/// Points with fields.
+pub fn points(file: &mut dyn Write, position: &[[f64; 3]], fields: &[(&str, Data)]) -> io::Result<()> {
+    let mut a = Appended::default();
+    let n = position.len();
+    let mut body = format!("<Piece NumberOfPoints=\"{n}\" NumberOfVerts=\"{n}\">\n<Points>\n");
+    body += &a.floats("Points", &Data::Vector(position));
+    body += "</Points>\n<Verts>\n";
+    body += &a.integers("connectivity", 0..n as i64);
+    body += &a.integers("offsets", 1..=n as i64);
+    body += "</Verts>\n<PointData>\n";
+    for (name, data) in fields {
+        body += &a.floats(name, data);
+    }
+    body += "</PointData>\n</Piece>\n";
+    a.finish(file, "PolyData", &body)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offsets_point_at_arrays_of_the_length_told() {
+        let mut out = Vec::new();
+        let speed = [1.0, 2.0];
+        points(&mut out, &[[0.0; 3], [1.0, 2.0, 3.0]], &[("speed", Data::Scalar(&speed))]).unwrap();
+        let start = out.windows(20).position(|w| w == b"encoding=\"raw\">\n_\x18\x00\x00").unwrap() + 17;
+        let text = String::from_utf8_lossy(&out[..start]).into_owned();
+        let at = |name: &str| {
+            let line = text.lines().find(|l| l.contains(&format!("Name=\"{name}\""))).unwrap();
+            let offset = line.split("offset=\"").nth(1).unwrap().split('"').next().unwrap();
+            start + offset.parse::<usize>().unwrap()
+        };
+        let length = |i: usize| u64::from_le_bytes(out[i..i + 8].try_into().unwrap());
+        assert_eq!((length(at("Points")), length(at("offsets")), length(at("speed"))), (24, 16, 8));
+        let second = f32::from_le_bytes(out[at("speed") + 12..at("speed") + 16].try_into().unwrap());
+        assert_eq!(second, 2.0);
+    }
+}
