@@ -196,7 +196,7 @@ fn chebyshev() -> String {
     "chebyshev".into()
 }
 fn tolerance() -> f64 {
-    1e-4
+    1e-2
 }
 
 /// [smooth]
@@ -302,7 +302,12 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("map.method", "", "particle-centroid", "particle-centroid"),
     ("smooth.method", "", "chebyshev", "chebyshev | uniformization (positive by proof) | none"),
     ("smooth.bandwidth", "m", "-", "b of the Gaussian exp(-r2/b2); 4 to 6 particle diameters"),
-    ("smooth.tolerance", "", "1e-4", "error of the smoothing operator"),
+    (
+        "smooth.tolerance",
+        "",
+        "1e-2",
+        "error of the smoothing operator; below 1e-2 the deposit's own error dominates",
+    ),
     ("interpolate.fluid_velocity", "", "gather", "gather | host-cell | linear"),
     (
         "forces.drag",

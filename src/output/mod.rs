@@ -66,7 +66,6 @@ impl Output {
         }
         if let Some(camera) = &mut self.camera {
             camera.take(s.time, s.step.mesh.bounds, p);
-            camera.save_last(&self.folder.join("bed.png"))?;
         }
         Ok(())
     }
@@ -74,7 +73,10 @@ impl Output {
     /// At the end of the run: the animation.
     pub fn finish(&mut self) -> io::Result<()> {
         match &self.camera {
-            Some(camera) => camera.save_animation(&self.folder.join("bed-animation.png")),
+            Some(camera) => {
+                camera.save_last(&self.folder.join("bed.png"))?;
+                camera.save_animation(&self.folder.join("bed-animation.png"))
+            }
             None => Ok(()),
         }
     }

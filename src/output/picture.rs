@@ -159,6 +159,7 @@ impl Camera {
         let mut e = png::Encoder::new(file, frames[0].width as u32, frames[0].height as u32);
         e.set_color(png::ColorType::Rgb);
         e.set_depth(png::BitDepth::Eight);
+        e.set_compression(png::Compression::Fast);
         if frames.len() > 1 {
             e.set_animated(frames.len() as u32, 0).map_err(io::Error::other)?;
             e.set_frame_delay(1, 12).map_err(io::Error::other)?;
