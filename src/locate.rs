@@ -81,7 +81,7 @@ impl Locator {
             let mut y = *x;
             *h = match self.walk(mesh, guess, &mut y) {
                 Walk::Found(slot) => slot,
-                Walk::Boundary(patch) => match search(mesh, *x, &mut y) {
+                Walk::Boundary(patch) => match search(mesh, y, self.planar) {
                     Some(slot) => slot,
                     None => {
                         let near = mesh.patch_names.get(patch as usize).cloned();
@@ -89,7 +89,7 @@ impl Locator {
                         NONE
                     }
                 },
-                Walk::Failed => search(mesh, *x, &mut y).unwrap_or_else(|| {
+                Walk::Failed => search(mesh, y, self.planar).unwrap_or_else(|| {
                     lost.push(Lost { index, position: *x, near: None });
                     NONE
                 }),
@@ -106,15 +106,28 @@ impl Locator {
 fn beyond(side: &crate::mesh::Side, x: &[f64; 3]) -> (f64, bool) {
     let n = &side.normal;
     let s = (n[0] * x[0] + n[1] * x[1] + n[2] * x[2]) - side.offset;
-    // on the face (s = 0): inside the cell the normal leaves, outside the other; cyclic faces keep it inside
-    let leaves = if side.sign > 0.0 { s > 0.0 } else { s < 0.0 || (s == 0.0 && side.shift == [0.0; 3]) };
+    // on the face (s = 0): inside the cell the normal leaves, outside the other; of the two images on a pair of
+    // cyclic faces the lower one is inside
+    let on = match side.shift.iter().find(|x| **x != 0.0) {
+        Some(shift) => *shift < 0.0,
+        None => side.sign < 0.0,
+    };
+    let leaves = side.sign * s > 0.0 || (s == 0.0 && on);
     (side.sign * s, leaves)
 }
 
 impl Locator {
     fn walk(&self, mesh: &Mesh, from: u32, x: &mut [f64; 3]) -> Walk {
         let mut cell = from;
-        for _ in 0..1000 {
+        // where the walk was at step 1, 2, 4, 8 …: a cell met again at the same point is a cycle (warped faces)
+        let (mut seen, mut next_mark) = ((NONE, *x), 1);
+        for step in 0..100_000 {
+            if seen == (cell, *x) {
+                return Walk::Failed;
+            }
+            if step == next_mark {
+                (seen, next_mark) = ((cell, *x), 2 * next_mark);
+            }
             // nearly always: strictly inside, no side needs a closer look
             let deepest =
                 mesh.sides(cell as usize).iter().map(|s| beyond(s, x).0).fold(f64::NEG_INFINITY, f64::max);
@@ -147,25 +160,31 @@ impl Locator {
     }
 }
 
-/// The cell of lowest id that holds `x` or one of its periodic images, by looking at all cells.
-fn search(mesh: &Mesh, x: [f64; 3], y: &mut [f64; 3]) -> Option<u32> {
-    let slack = mesh.bounds[0].iter().zip(&mesh.bounds[1]).map(|(a, b)| b - a).fold(0.0, f64::max);
-    if (0..3).any(|a| !(mesh.bounds[0][a] - slack..=mesh.bounds[1][a] + slack).contains(&x[a])) {
-        return None;
-    }
+/// Largest gap or overlap between cells of a warped mesh that a point may lie in, relative to the cell size.
+const GAP: f64 = 0.1;
+
+/// The cell that holds `x`, by looking at all cells: the one whose worst side is violated least (0: inside), the
+/// lowest id of equals. Between warped faces a point may be in no cell or in several.
+fn search(mesh: &Mesh, x: [f64; 3], planar: bool) -> Option<u32> {
+    let mut best: Option<(f64, u32)> = None;
     for cell in 0..mesh.len() {
         let size = mesh.volume[cell].cbrt();
-        let tolerance = BOUNDARY * size;
-        let inside = mesh.sides(cell).iter().all(|s| {
-            let (distance, leaves) = beyond(s, &x);
-            if s.across == NONE { distance <= tolerance } else { !leaves }
-        });
-        if inside {
-            *y = x;
-            return Some(cell as u32);
+        let allowed = if planar { BOUNDARY * size } else { GAP * size };
+        let mut worst = 0.0f64;
+        for side in mesh.sides(cell) {
+            let (distance, leaves) = beyond(side, &x);
+            let limit = if side.across == NONE { BOUNDARY * size } else { allowed };
+            if distance > limit || (planar && leaves) {
+                worst = f64::INFINITY;
+                break;
+            }
+            worst = worst.max(if side.across == NONE { 0.0 } else { distance });
+        }
+        if worst.is_finite() && best.is_none_or(|b| worst < b.0) {
+            best = Some((worst, cell as u32));
         }
     }
-    None
+    best.map(|b| b.1)
 }
 
 /// All faces flat to rounding? Then cells are convex cuts and the walk's end is unique.

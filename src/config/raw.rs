@@ -340,7 +340,9 @@ pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) 
         }
         row[b.len()]
     };
-    let best = known.into_iter().map(|k| (distance(name, k), k)).min()?;
+    // a name cut short is nearer than any other
+    let distance = |k: &str| if !name.is_empty() && k.starts_with(name) { 1 } else { distance(name, k) };
+    let best = known.into_iter().map(|k| (distance(k), k)).min()?;
     (best.0 <= name.len() / 2 + 1).then_some(best.1)
 }
 

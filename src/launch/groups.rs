@@ -107,6 +107,13 @@ impl Groups {
         self.first_failed
     }
 
+    /// A group killed by a signal: then the others failed because of it.
+    pub fn killed(&self) -> Option<usize> {
+        self.list
+            .iter()
+            .position(|g| g.status.is_some_and(|s| s.signal().is_some() || s.code().is_some_and(|c| c > 128)))
+    }
+
     /// Why the run failed: the coupler's words if it had any, else the end of a log.
     pub fn reason(&self, first: usize, coupler: Option<&str>) -> String {
         let g = &self.list[first];
@@ -126,7 +133,9 @@ impl Groups {
             None => format!("{} {how}", g.name),
         };
         let tail = std::fs::read_to_string(&g.log).unwrap_or_default();
-        let wanted = |l: &&str| l.contains("ERROR") || l.contains("rror:") || l.contains("voidage:");
+        let wanted = |l: &&str| {
+            (l.contains("ERROR") || l.contains("rror:") || l.contains("voidage:")) && !l.contains("ORTE_")
+        };
         if let Some(line) = tail.lines().rev().find(wanted).filter(|l| !text.contains(l.trim())) {
             text += &format!("\n  {} {how}; its log says: {}", g.name, line.trim());
         }

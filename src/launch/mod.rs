@@ -156,6 +156,7 @@ fn watch(config: &Config, groups: &mut Groups, stop: &AtomicBool) -> Outcome {
                 ui.line(&line);
             }
             ui.finish();
+            let first = groups.killed().unwrap_or(first);
             return Outcome::Failed(groups.reason(first, ui.error.as_deref()));
         }
         if groups.running() == 0 {

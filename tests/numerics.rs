@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Mesh, locate, smooth and the whole step: conservation, adjointness, positivity, bit-reproducibility.
+
+mod common;
+
+use common::{Hex, P, cloud, message, random};
+use voidage::couple::receive_mesh;
+use voidage::interpolate::FluidVelocity;
+use voidage::locate::Locator;
+use voidage::map::ParticleCentroid;
+use voidage::mesh::{Mesh, NONE, assemble};
+use voidage::particles::Particles;
+use voidage::smooth::{Active, Chebyshev, Smoother, Uniformization, Unsmoothed};
+use voidage::step::{CouplingStep, Drive, Fluid, Setup, Sources};
+use voidage::sums::sum;
+use voidage::{forces, scheme};
+use voidage_wire::Frame;
+
+const SIZE: [f64; 3] = [0.06, 0.04, 0.05];
+
+fn meshes() -> Vec<Hex> {
+    let hex = |jiggle, cyclic_x| Hex { n: [6, 5, 7], size: SIZE, jiggle, cyclic_x };
+    vec![hex(0.0, false), hex(0.0, true), hex(0.3, false), hex(0.3, true)]
+}
+
+fn check_same(a: &Mesh, b: &Mesh) {
+    assert_eq!(a.ids, b.ids);
+    let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(&a.volume), bits(&b.volume));
+    assert_eq!(a.centre, b.centre);
+    assert_eq!(a.links, b.links);
+    assert_eq!(a.sides.len(), b.sides.len());
+    for (s, t) in a.sides.iter().zip(&b.sides) {
+        assert_eq!(s, t);
+    }
+}
+
+#[test]
+fn a_mesh_is_the_same_to_the_bit_however_it_is_cut() {
+    for hex in meshes() {
+        let whole = assemble(&hex.whole()).unwrap();
+        assert!((sum(whole.volume.iter().copied()) / SIZE.iter().product::<f64>() - 1.0).abs() < 1e-13);
+        check_same(&whole, &assemble(&hex.pieces(2, |c| usize::from(c[0] >= 3))).unwrap());
+        check_same(&whole, &assemble(&hex.pieces(2, |c| usize::from(c[2] >= 2))).unwrap());
+        check_same(&whole, &assemble(&hex.pieces(3, |c| (c[0] / 2) % 3)).unwrap());
+    }
+}
+
+#[test]
+fn broken_meshes_are_named() {
+    let hex = &meshes()[0];
+    let mut pieces = hex.whole();
+    pieces[0].cell_ids[3] = 4;
+    assert!(assemble(&pieces).unwrap_err().to_string().contains("came twice"));
+    let mut pieces = hex.whole();
+    pieces[0].points[9][1] = f64::NAN;
+    assert!(assemble(&pieces).unwrap_err().to_string().contains("NaN"));
+    let mut pieces = hex.pieces(2, |c| usize::from(c[0] >= 3));
+    pieces[1].patches.retain(|p| !p.name.starts_with("to"));
+    assert!(assemble(&pieces).is_err());
+}
+
+#[test]
+fn every_point_has_one_host_whatever_the_guess() {
+    for hex in meshes() {
+        let mesh = assemble(&hex.whole()).unwrap();
+        let locator = Locator::new(&mesh);
+        let mut seed = 3;
+        let mut x: Vec<[f64; 3]> = (0..2000).map(|_| SIZE.map(|s| s * random(&mut seed))).collect();
+        // on faces, edges and corners too
+        x.extend((0..200).map(|i| {
+            [SIZE[0] * (i % 7) as f64 / 6.0, SIZE[1] * (i % 6) as f64 / 5.0, SIZE[2] * (i % 8) as f64 / 7.0]
+        }));
+        let locate = |guess: &mut dyn FnMut() -> u32| {
+            let mut host: Vec<u32> = x.iter().map(|_| guess()).collect();
+            locator.locate(&mesh, &mut x.clone(), &mut host).unwrap();
+            host
+        };
+        let cold = locate(&mut || NONE);
+        let n = mesh.len() as f64;
+        if hex.jiggle == 0.0 {
+            assert!(cold == locate(&mut || (n * random(&mut seed)) as u32), "same hosts from random guesses");
+        }
+        assert!(cold == locate(&mut || 0), "same hosts from another guess");
+        if hex.jiggle == 0.0 {
+            for (p, h) in x.iter().zip(&cold) {
+                let c = mesh.centre[*h as usize];
+                assert!(
+                    (0..3).all(|a| (p[a] - c[a]).abs() <= 0.5001 * SIZE[a] / hex.n[a] as f64),
+                    "{p:?} in {c:?}"
+                );
+            }
+        }
+        let mut out = vec![[SIZE[0] * 0.5, -1e-3, 0.01], [SIZE[0] + 1e-3, 0.01, 0.01]];
+        let lost = locator.locate(&mesh, &mut out, &mut [NONE, 0]).unwrap_err();
+        assert_eq!(lost[0].index, 0);
+        assert_eq!(lost[0].near.as_deref(), Some("y"));
+        assert_eq!(lost.len(), if hex.cyclic_x { 1 } else { 2 }, "cyclic faces let it through");
+        if hex.cyclic_x {
+            assert!((out[1][0] - 1e-3).abs() < 1e-12, "brought back");
+        }
+    }
+}
+
+fn smoothers(mesh: &Mesh) -> Vec<Box<dyn Smoother>> {
+    vec![
+        Box::new(Chebyshev::new(mesh, 0.02, 1e-2)),
+        Box::new(Chebyshev::new(mesh, 0.02, 1e-9)),
+        Box::new(Uniformization::new(mesh, 0.02, 1e-9)),
+        Box::new(Unsmoothed),
+    ]
+}
+
+#[test]
+fn smoothing_conserves_keeps_constants_and_is_self_adjoint() {
+    for hex in meshes() {
+        let mesh = assemble(&hex.whole()).unwrap();
+        let whole = Active::whole(&mesh);
+        for mut s in smoothers(&mesh) {
+            let mut seed = 5;
+            let field: Vec<[f64; 8]> =
+                (0..mesh.len()).map(|_| [0.0; 8].map(|_: f64| random(&mut seed))).collect();
+            let mut out = field.clone();
+            s.apply(&mut out, &whole);
+            let product = |a: &[[f64; 8]], i: usize, b: &[[f64; 8]], j: usize| {
+                sum((0..mesh.len()).map(|c| mesh.volume[c] * a[c][i] * b[c][j]))
+            };
+            let ones = vec![[1.0; 8]; mesh.len()];
+            for l in 0..8 {
+                let (before, after) = (product(&field, l, &ones, 0), product(&out, l, &ones, 0));
+                assert!((after / before - 1.0).abs() < 1e-14, "{} {after} {before}", s.name());
+            }
+            let (a, b) = (product(&out, 0, &field, 1), product(&field, 0, &out, 1));
+            assert!((a / b - 1.0).abs() < 1e-13, "{}: {a} {b}", s.name());
+            let mut constant = vec![[3.7; 8]; mesh.len()];
+            s.apply(&mut constant, &whole);
+            assert!(constant.iter().flatten().all(|x| (x / 3.7 - 1.0).abs() < 1e-14), "{}", s.name());
+        }
+    }
+}
+
+#[test]
+fn smoothers_agree_with_each_other_and_with_the_gaussian() {
+    // 1-D column of fine cells: a point source spreads to exp(−r²/b²), second moment b²/2
+    let n = 201;
+    let hex = Hex { n: [n, 1, 1], size: [0.201, 1e-3, 1e-3], jiggle: 0.0, cyclic_x: false };
+    let mesh = assemble(&hex.whole()).unwrap();
+    let b = 0.015;
+    let spread = |s: &mut dyn Smoother| {
+        let mut f = vec![[0.0; 8]; n];
+        f[100] = [1.0; 8];
+        s.apply(&mut f, &Active::whole(&mesh));
+        f.iter().map(|x| x[0]).collect::<Vec<_>>()
+    };
+    let cheb = spread(&mut Chebyshev::new(&mesh, b, 1e-12));
+    let unif = spread(&mut Uniformization::new(&mesh, b, 1e-12));
+    let second: f64 = cheb.iter().enumerate().map(|(i, w)| w * ((i as f64 - 100.0) * 1e-3).powi(2)).sum();
+    assert!((second / (b * b / 2.0) - 1.0).abs() < 1e-9, "{second}");
+    for (i, (c, u)) in cheb.iter().zip(&unif).enumerate() {
+        let gauss =
+            1e-3 / (b * std::f64::consts::PI.sqrt()) * (-((i as f64 - 100.0) * 1e-3 / b).powi(2)).exp();
+        assert!((c - u).abs() < 1e-11 && (c - gauss).abs() < 2e-3 * cheb[100], "{i}: {c} {u} {gauss}");
+        assert!(*u >= 0.0);
+    }
+}
+
+#[test]
+fn active_cells_give_the_bits_of_the_whole_sweep() {
+    let mesh =
+        assemble(&Hex { n: [12, 10, 100], size: [0.06, 0.05, 0.5], jiggle: 0.0, cyclic_x: true }.whole())
+            .unwrap();
+    for mut s in smoothers(&mesh) {
+        let occupied: Vec<u32> = (0..240).collect();
+        let mut active = Active::default();
+        active.update(&mesh, &occupied, s.degree());
+        assert!(active.rows.len() < mesh.len());
+        let mut field = vec![[0.0; 8]; mesh.len()];
+        let mut seed = 11;
+        occupied.iter().for_each(|c| field[*c as usize] = [0.0; 8].map(|_: f64| random(&mut seed)));
+        let (mut a, mut b) = (field.clone(), field);
+        s.apply(&mut a, &Active::whole(&mesh));
+        s.apply(&mut b, &active);
+        assert!(a == b, "{}: spread", s.name());
+        // gather: only occupied cells are read
+        let full: Vec<[f64; 8]> = (0..mesh.len()).map(|_| [0.0; 8].map(|_: f64| random(&mut seed))).collect();
+        let (mut a, mut b) = (full.clone(), full);
+        s.apply(&mut a, &Active::whole(&mesh));
+        s.apply(&mut b, &active);
+        assert!(occupied.iter().all(|c| a[*c as usize] == b[*c as usize]), "{}: gather", s.name());
+    }
+}
+
+fn setup(scheme: &str, fluid_velocity: FluidVelocity, model_b: bool) -> Setup {
+    Setup {
+        drag: forces::by_name("koch-hill").unwrap(),
+        scheme: scheme::by_name(scheme).unwrap(),
+        fluid_velocity,
+        model_b,
+        two_way: true,
+        pressure_force: !model_b,
+        archimedes: [0.0, 0.0, -9.81],
+        mean_pressure_gradient: [0.0; 3],
+        density: 1.2,
+        kinematic_viscosity: 1.5e-5,
+        period: 1e-3,
+        voidage_min: 0.0,
+        exclude_outside: false,
+    }
+}
+
+fn fluid(mesh: &Mesh) -> Fluid {
+    let wave =
+        |k: f64| mesh.centre.iter().map(|c| [0, 1, 2].map(|a| (k * c[a] * 90.0 + a as f64).sin())).collect();
+    Fluid { velocity: wave(1.0), pressure_gradient: wave(2.0), stress_divergence: wave(3.0) }
+}
+
+/// Two exchanges; what goes to both sides.
+fn exchange(
+    hex: &Hex,
+    cut: bool,
+    messages: &[Vec<u64>],
+    setup: Setup,
+) -> (Sources, Vec<(i64, [u64; 10])>, f64) {
+    let pieces = if cut { hex.pieces(2, |c| usize::from(c[0] >= 3)) } else { hex.whole() };
+    let mesh = assemble(&pieces).unwrap();
+    let f = fluid(&mesh);
+    let [g, positive]: [Box<dyn Smoother>; 2] =
+        [Box::new(Chebyshev::new(&mesh, 0.015, 1e-4)), Box::new(Uniformization::new(&mesh, 0.015, 1e-4))];
+    let model_a = !setup.model_b;
+    let mut step = CouplingStep::new(mesh, setup, Box::new(ParticleCentroid), g, positive);
+    let frames: Vec<Frame> = messages.iter().map(|m| Frame::parse(m).unwrap()).collect();
+    let mut p = Particles::receive(&frames).unwrap();
+    step.before_fluid(&mut p, true).unwrap();
+    step.after_fluid(&p, &f, true).unwrap();
+    step.before_fluid(&mut p, false).unwrap();
+    step.after_fluid(&p, &f, false).unwrap();
+    assert!(step.facts.solid_volume_error < 1e-13 && step.facts.solid_momentum_error < 1e-13);
+    // the fluid's side, from the arrays it is given and its own fields
+    let (s, m) = (&step.sources, &step.mesh);
+    let reaction = [0, 1, 2].map(|a| {
+        sum((0..m.len()).map(|j| {
+            let pressure = if model_a { f.pressure_gradient[j][a] - f.stress_divergence[j][a] } else { 0.0 };
+            -1e-3 * m.volume[j] * (s.su[j][a] - s.sp[j] * f.velocity[j][a] + (1.0 - s.voidage[j]) * pressure)
+        }))
+    });
+    step.books.reaction = reaction;
+    let error = step.books.error(None);
+    let Drive { drag_coefficient, velocity, force, charged } = &step.drive;
+    let bits = |i: usize| {
+        let all = [[drag_coefficient[i]].as_slice(), &velocity[i], &force[i], &charged[i]].concat();
+        (p.id[i], std::array::from_fn(|k| all[k].to_bits()))
+    };
+    let drive = (0..p.len()).map(bits).collect();
+    (step.sources.clone(), drive, error)
+}
+
+#[test]
+fn action_is_reaction_for_every_scheme_interpolation_and_model() {
+    for hex in meshes() {
+        let list = [message(&cloud(3000, SIZE, 4e-4))];
+        for s in scheme::all() {
+            for how in [FluidVelocity::Gather, FluidVelocity::HostCell, FluidVelocity::Linear] {
+                for model_b in [false, true] {
+                    let (sources, _, error) = exchange(&hex, false, &list, setup(s.name(), how, model_b));
+                    assert!(error < 1e-12, "{} {how:?} {model_b}: {error:e}", s.name());
+                    assert!(sources.sp.iter().all(|x| *x >= 0.0));
+                    assert!(sources.voidage.iter().all(|e| *e > 0.0 && *e <= 1.0));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn replies_are_bit_identical_for_any_ranks_and_order() {
+    for hex in meshes() {
+        let all = cloud(2000, SIZE, 4e-4);
+        let mut shuffled = all.clone();
+        let mut seed = 17;
+        for i in (1..shuffled.len()).rev() {
+            shuffled.swap(i, (random(&mut seed) * (i + 1) as f64) as usize);
+        }
+        let (left, right): (Vec<P>, Vec<P>) = shuffled.iter().partition(|p| p.x[2] < 0.02);
+        let how = || setup("conservative", FluidVelocity::Linear, false);
+        let one = exchange(&hex, false, &[message(&all)], how());
+        let two = exchange(&hex, false, &[message(&left), message(&right)], how());
+        let cut = exchange(&hex, true, &[message(&right), message(&[]), message(&left)], how());
+        assert!(one.0 == two.0 && one.1 == two.1, "DEM ranks and order");
+        assert!(one.0 == cut.0 && one.1 == cut.1, "CFD ranks");
+    }
+}
+
+#[test]
+fn a_cell_without_fluid_stops_the_step_with_advice() {
+    let hex = &meshes()[0];
+    let mesh = assemble(&hex.whole()).unwrap();
+    let none = || -> Box<dyn Smoother> { Box::new(Unsmoothed) };
+    let mut step = CouplingStep::new(
+        mesh,
+        setup("conservative", FluidVelocity::Gather, false),
+        Box::new(ParticleCentroid),
+        none(),
+        none(),
+    );
+    let big = P { id: 1, x: [0.031, 0.02, 0.02], v: [0.0; 3], r: 0.006, ledger: [0.0; 3] };
+    let words = message(&[big]);
+    let mut p = Particles::receive(&[Frame::parse(&words).unwrap()]).unwrap();
+    let e = step.before_fluid(&mut p, true).unwrap_err().to_string();
+    assert!(e.contains("raise smooth.bandwidth") && e.contains("cell "), "{e}");
+    p.position[0] = [1.0, 1.0, 1.0];
+    let e = step.before_fluid(&mut p, true).unwrap_err().to_string();
+    assert!(e.contains("particle 1 at") && e.contains("outside"), "{e}");
+}
+
+#[test]
+fn the_mesh_comes_through_the_wire() {
+    let mut none = voidage::partners::Partners::<voidage_wire::memory::Memory>::new(
+        vec![],
+        vec![],
+        std::time::Duration::ZERO,
+    );
+    assert!(receive_mesh(&mut none).is_err(), "no CFD rank, no mesh");
+}
