@@ -39,7 +39,11 @@ fn copy(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).unwrap();
     for e in std::fs::read_dir(from).unwrap().flatten() {
         let to = to.join(e.file_name());
-        if e.path().is_dir() { copy(&e.path(), &to) } else { drop(std::fs::copy(e.path(), to).unwrap()) }
+        if e.path().is_dir() {
+            copy(&e.path(), &to);
+        } else {
+            std::fs::copy(e.path(), to).unwrap();
+        }
     }
 }
 
@@ -82,7 +86,9 @@ fn family(pid: u32) -> Vec<(u32, String)> {
 fn start(case: &Path, set: &[&str]) -> Child {
     let mut c = voidage();
     c.arg("run").arg(case);
-    set.iter().for_each(|s| drop(c.args(["--set", s])));
+    for s in set {
+        c.args(["--set", s]);
+    }
     c.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 

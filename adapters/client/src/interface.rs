@@ -246,6 +246,7 @@ mod tests {
     #[test]
     fn null_and_panics_are_errors_with_a_message() {
         let none = std::ptr::null_mut();
+        // SAFETY: valid until the next failure, and copied at once
         let last = || unsafe { CStr::from_ptr(voidage_last_error()) }.to_string_lossy().into_owned();
         // SAFETY: null is what is tested
         unsafe {
