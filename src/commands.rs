@@ -161,7 +161,8 @@ fn exchange(
     partners: &mut Partners<voidage_shm::Channel>,
 ) -> Result<(), String> {
     let start_limit = Duration::from_secs_f64(session.start);
-    partners.meet(&session.token, start_limit, || session.launcher.is_alive()).map_err(|e| e.to_string())?;
+    partners.belongs_to(session.launcher);
+    partners.meet(&session.token, start_limit).map_err(|e| e.to_string())?;
     setup::agree(config, partners)?;
     let welcome = setup::welcome(config);
     for i in partners.dem().chain(partners.cfd()) {

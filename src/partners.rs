@@ -7,7 +7,9 @@
 use std::time::{Duration, Instant};
 use thiserror::Error;
 use voidage_wire::transport::{LOOK, send_copy};
-use voidage_wire::{Frame, Hello, Role, Transport, TransportError, Welcome, WireError, frame, hello, kind};
+use voidage_wire::{
+    Frame, Hello, Process, Role, Transport, TransportError, Welcome, WireError, frame, hello, kind,
+};
 
 /// Why the partners cannot go on.
 #[derive(Debug, Error)]
@@ -67,6 +69,9 @@ pub enum PartnerError {
         /// what failed
         source: TransportError,
     },
+    /// `voidage run` is gone.
+    #[error("`voidage run`, which started this run, has ended")]
+    Orphaned,
     /// A hello that does not belong here.
     #[error("{who}: {what}")]
     Stranger {
@@ -91,6 +96,8 @@ pub struct Partners<T: Transport> {
     list: Vec<Partner<T>>,
     dem_ranks: usize,
     limit: Duration,
+    launcher: Option<Process>,
+    looked: Instant,
 }
 
 impl<T: Transport> Partners<T> {
@@ -108,7 +115,11 @@ impl<T: Transport> Partners<T> {
         };
         let list = dem.into_iter().enumerate().map(partner(Role::Dem));
         let list = list.chain(cfd.into_iter().enumerate().map(partner(Role::Cfd))).collect();
-        Self { list, dem_ranks, limit }
+        Self { list, dem_ranks, limit, launcher: None, looked: Instant::now() }
+    }
+    /// The run ends when this process (who launched it) is gone.
+    pub fn belongs_to(&mut self, launcher: Process) {
+        self.launcher = Some(launcher);
     }
     /// Indices of the DEM ranks.
     pub fn dem(&self) -> std::ops::Range<usize> {
@@ -127,22 +138,14 @@ impl<T: Transport> Partners<T> {
         self.list[i].hello.as_ref()
     }
 
-    /// Waits for all hellos of the run `token`. `launched` tells whether whoever started the run still lives.
-    pub fn meet(
-        &mut self,
-        token: &str,
-        limit: Duration,
-        launched: impl Fn() -> bool,
-    ) -> Result<(), PartnerError> {
+    /// Waits for all hellos of the run `token`.
+    pub fn meet(&mut self, token: &str, limit: Duration) -> Result<(), PartnerError> {
         let start = Instant::now();
         for i in 0..self.list.len() {
             while self.list[i].hello.is_none() {
                 let who = self.who(i);
                 if start.elapsed() > limit {
                     return Err(PartnerError::Absent { who, seconds: limit.as_secs_f64() });
-                }
-                if !launched() {
-                    return Err(PartnerError::Stranger { who, what: "`voidage run` has ended".into() });
                 }
                 let sample = self.list[i].transport.receive(LOOK);
                 if let Some(s) =
@@ -182,6 +185,10 @@ impl<T: Transport> Partners<T> {
 
     /// Error if any partner but `except` gave up, or any has died.
     fn look(&mut self, except: usize, what: &'static str) -> Result<(), PartnerError> {
+        self.looked = Instant::now();
+        if self.launcher.is_some_and(|l| !l.is_alive()) {
+            return Err(PartnerError::Orphaned);
+        }
         for j in 0..self.list.len() {
             let who = self.who(j);
             let p = &mut self.list[j];
@@ -216,6 +223,10 @@ impl<T: Transport> Partners<T> {
     pub fn receive(&mut self, i: usize, kind: u32, what: &'static str) -> Result<T::Sample, PartnerError> {
         let start = Instant::now();
         let who = self.who(i);
+        // also when nobody lets us wait
+        if self.looked.elapsed() > Duration::from_secs(1) {
+            self.look(i, what)?;
+        }
         loop {
             let next = match self.list[i].pending.take() {
                 Some(s) => Some(s),
@@ -273,7 +284,7 @@ impl<T: Transport> Partners<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use voidage_wire::{Process, memory};
+    use voidage_wire::memory;
 
     fn hello(role: Role, rank: u32, process: Process) -> Vec<u64> {
         let program = "test".into();
@@ -296,7 +307,7 @@ mod tests {
         send_copy(&mut a, &hello(Role::Dem, 0, dem)).unwrap();
         send_copy(&mut b, &hello(Role::Cfd, 0, cfd)).unwrap();
         let mut p = Partners::new(vec![sa], vec![sb], Duration::from_millis(500));
-        p.meet("t", Duration::from_secs(5), || true).unwrap();
+        p.meet("t", Duration::from_secs(5)).unwrap();
         (p, a, b)
     }
 
@@ -326,18 +337,18 @@ mod tests {
         let (mut a, sa) = memory::pair("DEM", "coupler");
         send_copy(&mut a, &hello(Role::Dem, 0, Process::own())).unwrap();
         let mut p = Partners::new(vec![sa], vec![], Duration::from_secs(1));
-        let e = p.meet("other", Duration::from_secs(1), || true).unwrap_err().to_string();
+        let e = p.meet("other", Duration::from_secs(1)).unwrap_err().to_string();
         assert!(e.contains("a hello of run t"), "{e}");
         let (mut a, sa) = memory::pair("DEM", "coupler");
         let mut h = hello(Role::Dem, 0, Process::own());
         h[0] += 1;
         send_copy(&mut a, &h).unwrap();
         let mut p = Partners::new(vec![sa], vec![], Duration::from_secs(1));
-        let e = p.meet("t", Duration::from_secs(1), || true).unwrap_err().to_string();
+        let e = p.meet("t", Duration::from_secs(1)).unwrap_err().to_string();
         assert!(e.contains("protocol version 2, this program speaks 1"), "{e}");
         let (_a, sa) = memory::pair("DEM", "coupler");
         let mut p = Partners::new(vec![sa], vec![], Duration::from_secs(1));
-        let e = p.meet("t", Duration::from_millis(300), || true).unwrap_err().to_string();
+        let e = p.meet("t", Duration::from_millis(300)).unwrap_err().to_string();
         assert!(e.starts_with("DEM rank 0 did not connect"), "{e}");
     }
 }
