@@ -31,7 +31,7 @@ pub struct CaseFile {
     pub limits: Limits,
 }
 
-/// [run]
+/// Section `run`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 #[allow(missing_docs)]
@@ -77,7 +77,7 @@ fn solved() -> Flow {
     Flow::Solved
 }
 
-/// [fluid]
+/// Section `fluid`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(missing_docs)]
@@ -112,7 +112,7 @@ fn liggghts() -> String {
     "liggghts".into()
 }
 
-/// [dem]
+/// Section `dem`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(missing_docs)]
@@ -163,7 +163,7 @@ fn voidage_rate() -> Continuity {
     Continuity::VoidageRate
 }
 
-/// [coupling]
+/// Section `coupling`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(missing_docs)]
@@ -179,7 +179,7 @@ pub struct Coupling {
     pub continuity: Continuity,
 }
 
-/// [map]
+/// Section `map`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 #[allow(missing_docs)]
@@ -199,7 +199,7 @@ fn tolerance() -> f64 {
     1e-2
 }
 
-/// [smooth]
+/// Section `smooth`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(missing_docs)]
@@ -212,7 +212,7 @@ pub struct Smooth {
     pub tolerance: f64,
 }
 
-/// [interpolate]
+/// Section `interpolate`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 #[allow(missing_docs)]
@@ -229,7 +229,7 @@ fn yes() -> bool {
     true
 }
 
-/// [forces]
+/// Section `forces`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(missing_docs)]
@@ -241,7 +241,7 @@ pub struct Forces {
     pub viscous_stress: bool,
 }
 
-/// [output]
+/// Section `output`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 #[allow(missing_docs)]
@@ -256,7 +256,7 @@ impl Default for Output {
     }
 }
 
-/// [limits]
+/// Section `limits`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 #[allow(missing_docs)]
