@@ -7,7 +7,7 @@
 use crate::mesh::{Mesh, NONE};
 use crate::step::Lanes;
 
-/// Weights of all particles: particle i goes to `cell[k]` by `weight[k]`, k in start[i]..start[i+1].
+/// Weights of all particles: particle i goes to `cell[k]` by `weight[k]`, k from `start[i]` to `start[i+1]`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Weights {
     /// first entry of each particle; one more at the end
