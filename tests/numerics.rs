@@ -85,9 +85,11 @@ fn every_point_has_one_host_whatever_the_guess() {
         if hex.jiggle == 0.0 {
             for (p, h) in x.iter().zip(&cold) {
                 let c = mesh.centre[*h as usize];
-                // the upper cyclic face is the lower one
-                let image = |a: usize| if a == 0 && hex.cyclic_x && p[a] == SIZE[a] { 0.0 } else { p[a] };
-                let near = |a: usize| (image(a) - c[a]).abs() <= 0.5001 * SIZE[a] / hex.n[a] as f64;
+                // across the cyclic faces too
+                let gap = |a: usize| (p[a] - c[a]).abs();
+                let gap =
+                    |a: usize| if a == 0 && hex.cyclic_x { gap(a).min(SIZE[0] - gap(a)) } else { gap(a) };
+                let near = |a: usize| gap(a) <= 0.5001 * SIZE[a] / hex.n[a] as f64;
                 assert!((0..3).all(near), "{p:?} in {c:?}");
             }
         }
