@@ -25,6 +25,8 @@ pub struct Locator {
     bins: [usize; 3],
     seed: Vec<u32>,
     planar: bool,
+    /// per side: outward normal and offset, contiguous; all that is read while a particle stays in its cell
+    planes: Vec<[f64; 4]>,
     /// distance a point may lie outside a boundary face of a cell, m
     tolerance: Vec<f64>,
 }
@@ -53,6 +55,7 @@ impl Locator {
             bins,
             seed: vec![NONE; bins.iter().product()],
             planar: planar(mesh),
+            planes: mesh.sides.iter().map(plane).collect(),
             tolerance,
         };
         for (slot, c) in mesh.centre.iter().enumerate() {
@@ -102,6 +105,10 @@ impl Locator {
     }
 }
 
+fn plane(s: &crate::mesh::Side) -> [f64; 4] {
+    [s.sign * s.normal[0], s.sign * s.normal[1], s.sign * s.normal[2], s.sign * s.offset]
+}
+
 /// How far `x` lies beyond a side (> 0: outside), and whether it belongs to the cell across.
 fn beyond(side: &crate::mesh::Side, x: &[f64; 3]) -> (f64, bool) {
     let n = &side.normal;
@@ -129,8 +136,9 @@ impl Locator {
                 (seen, next_mark) = ((cell, *x), 2 * next_mark);
             }
             // nearly always: strictly inside, no side needs a closer look
-            let deepest =
-                mesh.sides(cell as usize).iter().map(|s| beyond(s, x).0).fold(f64::NEG_INFINITY, f64::max);
+            let range = mesh.side_start[cell as usize] as usize..mesh.side_start[cell as usize + 1] as usize;
+            let out = |p: &[f64; 4]| (p[0] * x[0] + p[1] * x[1] + p[2] * x[2]) - p[3];
+            let deepest = self.planes[range].iter().map(out).fold(f64::NEG_INFINITY, f64::max);
             if deepest < 0.0 {
                 return Walk::Found(cell);
             }

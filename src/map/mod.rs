@@ -75,6 +75,10 @@ impl Weights {
     }
     /// Σ_k m_ik φ_k of particle i.
     pub fn gather(&self, lanes: &[Lanes], i: usize) -> Lanes {
+        let range = self.start[i] as usize..self.start[i + 1] as usize;
+        if range.len() == 1 && self.weight[range.start] == 1.0 {
+            return lanes[self.cell[range.start] as usize];
+        }
         let mut sum = [0.0; 8];
         for (cell, m) in self.entries(i) {
             (0..8).for_each(|a| sum[a] += m * lanes[cell][a]);
