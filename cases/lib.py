@@ -122,3 +122,57 @@ def foam_field(path):
     if vectors:
         return [tuple(float(x) for x in v) for v in vectors]
     return [float(x) for x in re.findall(number, body.replace(")", " ").replace(";", " ").replace("(", " "))]
+
+
+def _list(path):
+    """Text between the outer brackets of an ascii OpenFOAM list file, without its header and comments."""
+    with open(path) as f:
+        text = re.sub(r"//[^\n]*|/\*.*?\*/", "", f.read(), flags=re.S)
+    text = text[text.index("}") + 1:]
+    return text[text.index("(") + 1:text.rindex(")")]
+
+
+def cells(mesh):
+    """[(centre, volume)] of the cells of an ascii polyMesh folder, m and m3; sums of pyramids over the faces."""
+    points = [tuple(float(x) for x in p.split()) for p in re.findall(r"\(([^()]+)\)", _list(f"{mesh}/points"))]
+    faces = [[int(i) for i in f.split()] for f in re.findall(r"\(([^()]+)\)", _list(f"{mesh}/faces"))]
+    owner, neighbour = ([int(i) for i in _list(f"{mesh}/{name}").split()] for name in ("owner", "neighbour"))
+    n = max(owner) + 1
+    sides = [[] for _ in range(n)]
+    for i, face in enumerate(faces):
+        sides[owner[i]].append((face, 1))
+        if i < len(neighbour):
+            sides[neighbour[i]].append((face, -1))
+    result = []
+    for side in sides:
+        corners = [points[p] for face, _ in side for p in face]
+        apex = [sum(p[a] for p in corners) / len(corners) for a in range(3)]
+        volume, moment = 0.0, [0.0] * 3
+        for face, sign in side:
+            x = [points[p] for p in face]
+            mid = [sum(p[a] for p in x) / len(x) for a in range(3)]
+            for p, q in zip(x, x[1:] + x[:1]):
+                # tetrahedron apex, mid, p, q
+                u, v, w = ([c[a] - apex[a] for a in range(3)] for c in (mid, p, q))
+                tetra = sign / 6 * (u[0] * (v[1] * w[2] - v[2] * w[1]) + u[1] * (v[2] * w[0] - v[0] * w[2])
+                                    + u[2] * (v[0] * w[1] - v[1] * w[0]))
+                volume += tetra
+                for a in range(3):
+                    moment[a] += tetra * (apex[a] + mid[a] + p[a] + q[a]) / 4
+        result.append((tuple(m / volume for m in moment), volume))
+    return result
+
+
+def fields(folder, names, cfd_ranks=1, time=None):
+    """One row per cell: (centre, volume, value of each named ascii field), at `time` (text) or the last time.
+
+    Reads the processor folders when the run was decomposed; the rows of all ranks follow one another."""
+    fluid, rows = os.path.join(folder, "fluid"), []
+    for part in [fluid] if cfd_ranks == 1 else [os.path.join(fluid, f"processor{r}") for r in range(cfd_ranks)]:
+        times = [t for t in os.listdir(part) if re.fullmatch(r"\d+(\.\d+)?", t) and float(t) > 0]
+        at = os.path.join(part, time or max(times, key=float))
+        mesh = cells(os.path.join(part, "constant", "polyMesh"))
+        values = [foam_field(os.path.join(at, name)) for name in names]
+        values = [v * len(mesh) if len(v) == 1 else v for v in values]
+        rows += [(c, v, *row) for (c, v), *row in zip(mesh, *values)]
+    return rows
