@@ -58,7 +58,7 @@ pub fn companions() -> Result<Companions, String> {
     })
 }
 
-fn mpirun(ranks: u32, export: &[&str]) -> Vec<String> {
+fn mpirun(ranks: u32, shared: &Path, export: &[&str]) -> Vec<String> {
     let mut c = vec!["mpirun".to_string()];
     let root = std::os::unix::fs::MetadataExt::uid(
         &std::fs::metadata("/proc/self").ok().unwrap_or_else(|| unreachable!("/proc is there on Linux")),
@@ -68,6 +68,8 @@ fn mpirun(ranks: u32, export: &[&str]) -> Vec<String> {
     }
     // two mpiruns on one machine would bind to the same cores; waiting ranks must yield to the others
     c.extend(["--oversubscribe", "--bind-to", "none", "--mca", "mpi_yield_when_idle", "1"].map(String::from));
+    // Open MPI's own segments go where `janitor::clean` finds them, also after a kill
+    c.extend(["--mca".into(), "btl_vader_backing_directory".into(), shared.display().to_string()]);
     c.extend(export.iter().flat_map(|e| ["-x".to_string(), (*e).to_string()]));
     c.extend(["-np".to_string(), ranks.to_string()]);
     c
@@ -106,9 +108,12 @@ fn start(
     let preload = format!("LD_PRELOAD={}", home.fix.display());
     let text = |p: &Path| p.display().to_string();
 
-    let mut couple = mpirun(1, &[&session]);
+    let shared =
+        Path::new(voidage_shm::janitor::SHARED_MEMORY).join(voidage_shm::janitor::prefix(&s.token) + "mpi");
+    std::fs::create_dir(&shared).map_err(|e| format!("{}: {e}", shared.display()))?;
+    let mut couple = mpirun(1, &shared, &[&session]);
     couple.extend([text(&home.voidage), "couple".into(), text(&config.folder), "--resolved".into()]);
-    let mut dem = mpirun(f.run.dem_ranks, &[&session, &preload]);
+    let mut dem = mpirun(f.run.dem_ranks, &shared, &[&session, &preload]);
     dem.extend([
         f.dem.program.clone(),
         "-in".into(),
@@ -117,7 +122,7 @@ fn start(
         text(&logs.join("liggghts.log")),
     ]);
     dem.extend(f.dem.variables.iter().flat_map(|(k, v)| ["-var".to_string(), k.clone(), v.clone()]));
-    let mut cfd = mpirun(f.run.cfd_ranks, &[&session, &foam]);
+    let mut cfd = mpirun(f.run.cfd_ranks, &shared, &[&session, &foam]);
     let solver = if f.fluid.solver == "voidageFoam" { text(&home.solver) } else { f.fluid.solver.clone() };
     cfd.extend([solver, "-case".into(), text(&config.fluid_case())]);
     if f.run.cfd_ranks > 1 {

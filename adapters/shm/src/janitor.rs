@@ -51,7 +51,13 @@ fn remove_shared(token: &str) -> io::Result<usize> {
     for entry in std::fs::read_dir(SHARED_MEMORY)? {
         let entry = entry?;
         if entry.file_name().to_string_lossy().starts_with(&prefix) {
-            match std::fs::remove_file(entry.path()) {
+            // the folder holds what MPI ranks share; Open MPI leaves it behind when a rank is killed
+            let gone = if entry.path().is_dir() {
+                std::fs::remove_dir_all(entry.path())
+            } else {
+                std::fs::remove_file(entry.path())
+            };
+            match gone {
                 Ok(()) => n += 1,
                 Err(e) if e.kind() == io::ErrorKind::NotFound => {}
                 Err(e) => return Err(e),
