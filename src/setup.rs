@@ -6,7 +6,7 @@ use crate::interpolate::FluidVelocity;
 use crate::map::Mapping;
 use crate::mesh::Mesh;
 use crate::partners::Partners;
-use crate::smooth::{self, Smoother};
+use crate::smooth::{self, Diffusion, Smoother};
 use crate::step::Setup;
 use crate::{forces, map, scheme};
 use voidage_wire::{Transport, Welcome};
@@ -48,10 +48,9 @@ pub fn mapping(c: &Config) -> Result<Box<dyn Mapping>, String> {
 /// The smoother asked for and the positive one for redone steps.
 pub fn smoothers(c: &Config, mesh: &Mesh) -> Result<[Box<dyn Smoother>; 2], String> {
     let s = &c.file.smooth;
-    let make = |name: &str| smooth::by_name(name, mesh, s.bandwidth, s.tolerance);
-    let positive = if s.method == "none" { "none" } else { "uniformization" };
-    let unknown = || format!("smooth.method = \"{}\" is not known", s.method);
-    Ok([make(&s.method).ok_or_else(unknown)?, make(positive).ok_or_else(unknown)?])
+    let t = Diffusion::uniform(s.bandwidth).links(mesh);
+    smooth::pair(&s.method, mesh, &t, s.tolerance)
+        .ok_or_else(|| format!("smooth.method = \"{}\" is not known", s.method))
 }
 
 /// What the partners are told (names in `docs/wire.md`).

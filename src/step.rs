@@ -15,7 +15,7 @@ use crate::map::{Mapping, Weights};
 use crate::mesh::Mesh;
 use crate::particles::Particles;
 use crate::scheme::Scheme;
-use crate::smooth::{Active, Smoother};
+use crate::smooth::{Active, Direction, Scratch, Smoother};
 use crate::sums::{norm, sum, sum3};
 use thiserror::Error;
 
@@ -168,6 +168,7 @@ pub struct CouplingStep {
     predicted: Vec<Predicted>,
     lanes: Vec<Lanes>,
     lanes_b: Vec<Lanes>,
+    scratch: Scratch,
     use_positive: bool,
     /// Voidage and sources of this step.
     pub sources: Sources,
@@ -206,6 +207,7 @@ impl CouplingStep {
             predicted: Vec::new(),
             lanes: zero.clone(),
             lanes_b: zero,
+            scratch: Scratch::new(n),
             use_positive: false,
             sources: Sources {
                 voidage: vec![1.0; n],
@@ -234,8 +236,8 @@ impl CouplingStep {
         std::mem::swap(&mut self.sources.voidage, &mut self.sources.voidage_old);
         self.use_positive = false;
         loop {
-            let degree = self.smoother().degree();
-            self.active.update(&self.mesh, &self.weights.cell, degree);
+            let smoother = if self.use_positive { &self.positive } else { &self.smoother };
+            smoother.plan(&self.weights.cell, &mut self.active);
             self.smooth_solids(p);
             let fits = self.lanes.iter().all(|l| l[0] >= 0.0) && (first || self.sources_of(p));
             if fits || self.use_positive {
@@ -277,13 +279,9 @@ impl CouplingStep {
         Ok(())
     }
 
-    fn smoother(&mut self) -> &mut dyn Smoother {
-        if self.use_positive { &mut *self.positive } else { &mut *self.smoother }
-    }
-
-    fn smooth(&mut self, lanes: &mut [Lanes]) {
+    fn smooth(&mut self, lanes: &mut [Lanes], direction: Direction) {
         let smoother = if self.use_positive { &mut self.positive } else { &mut self.smoother };
-        smoother.apply(lanes, &self.active);
+        smoother.apply(lanes, &self.active, direction, &mut self.scratch);
     }
 
     /// Stage 4 (pass a): ε_s in lane 0, ε_s U_s in lanes 1–3.
@@ -294,7 +292,7 @@ impl CouplingStep {
             let (v, u) = (p.volume(i), p.velocity[i]);
             [v, v * u[0], v * u[1], v * u[2], 0.0, 0.0, 0.0, 0.0]
         });
-        self.smooth(&mut lanes);
+        self.smooth(&mut lanes, Direction::Spread);
         self.lanes = lanes;
         let total = sum((0..p.len()).filter(|i| self.coupled[*i]).map(|i| p.volume(i)));
         let found = sum(self.lanes.iter().zip(&self.mesh.volume).map(|(l, v)| l[0] * v));
@@ -340,7 +338,7 @@ impl CouplingStep {
         self.weights.deposit(&self.mesh, &mut lanes, |i| {
             linearise(&predicted[i], p.velocity[i], p.ledger[i], period)
         });
-        self.smooth(&mut lanes);
+        self.smooth(&mut lanes, Direction::Spread);
         let positive = lanes.iter().all(|l| l[0] >= 0.0);
         for (j, l) in lanes.iter().enumerate() {
             self.sources.sp[j] = l[0];
@@ -458,7 +456,7 @@ impl CouplingStep {
         }
         let mut gathered = std::mem::take(&mut self.gathered);
         gathered.clone_from(&self.fluid);
-        self.smooth(&mut gathered);
+        self.smooth(&mut gathered, Direction::Gather);
         self.gathered = gathered;
         Ok(())
     }

@@ -10,7 +10,7 @@ use voidage::locate::Locator;
 use voidage::map::ParticleCentroid;
 use voidage::mesh::{Mesh, NONE, assemble};
 use voidage::particles::Particles;
-use voidage::smooth::{Active, Chebyshev, Smoother, Uniformization, Unsmoothed};
+use voidage::smooth::{self, Active, Diffusion, Direction, Scratch, Smoother, Unsmoothed};
 use voidage::step::{CouplingStep, Drive, Fluid, Setup, Sources};
 use voidage::sums::sum;
 use voidage::{forces, scheme};
@@ -104,26 +104,29 @@ fn every_point_has_one_host_whatever_the_guess() {
     }
 }
 
+fn smoother(name: &str, mesh: &Mesh, bandwidth: f64, tolerance: f64) -> Box<dyn Smoother> {
+    smooth::by_name(name, mesh, &Diffusion::uniform(bandwidth).links(mesh), tolerance).unwrap()
+}
+
 fn smoothers(mesh: &Mesh) -> Vec<Box<dyn Smoother>> {
-    vec![
-        Box::new(Chebyshev::new(mesh, 0.02, 1e-2)),
-        Box::new(Chebyshev::new(mesh, 0.02, 1e-9)),
-        Box::new(Uniformization::new(mesh, 0.02, 1e-9)),
-        Box::new(Unsmoothed),
-    ]
+    let of = |name: &&str| [1e-2, 1e-9].map(|t| smoother(name, mesh, 0.02, t));
+    smooth::NAMES.iter().flat_map(of).collect()
+}
+
+fn all_of(s: &mut dyn Smoother, lanes: &mut [[f64; 8]]) {
+    s.apply(lanes, &Active::whole(lanes.len()), Direction::Spread, &mut Scratch::default());
 }
 
 #[test]
 fn smoothing_conserves_keeps_constants_and_is_self_adjoint() {
     for hex in meshes() {
         let mesh = assemble(&hex.whole()).unwrap();
-        let whole = Active::whole(&mesh);
         for mut s in smoothers(&mesh) {
             let mut seed = 5;
             let field: Vec<[f64; 8]> =
                 (0..mesh.len()).map(|_| [0.0; 8].map(|_: f64| random(&mut seed))).collect();
             let mut out = field.clone();
-            s.apply(&mut out, &whole);
+            all_of(&mut *s, &mut out);
             let product = |a: &[[f64; 8]], i: usize, b: &[[f64; 8]], j: usize| {
                 sum((0..mesh.len()).map(|c| mesh.volume[c] * a[c][i] * b[c][j]))
             };
@@ -135,7 +138,7 @@ fn smoothing_conserves_keeps_constants_and_is_self_adjoint() {
             let (a, b) = (product(&out, 0, &field, 1), product(&field, 0, &out, 1));
             assert!((a / b - 1.0).abs() < 1e-13, "{}: {a} {b}", s.name());
             let mut constant = vec![[3.7; 8]; mesh.len()];
-            s.apply(&mut constant, &whole);
+            all_of(&mut *s, &mut constant);
             assert!(constant.iter().flatten().all(|x| (x / 3.7 - 1.0).abs() < 1e-14), "{}", s.name());
         }
     }
@@ -151,11 +154,11 @@ fn smoothers_agree_with_each_other_and_with_the_gaussian() {
     let spread = |s: &mut dyn Smoother| {
         let mut f = vec![[0.0; 8]; n];
         f[100] = [1.0; 8];
-        s.apply(&mut f, &Active::whole(&mesh));
+        all_of(s, &mut f);
         f.iter().map(|x| x[0]).collect::<Vec<_>>()
     };
-    let cheb = spread(&mut Chebyshev::new(&mesh, b, 1e-12));
-    let unif = spread(&mut Uniformization::new(&mesh, b, 1e-12));
+    let cheb = spread(&mut *smoother("chebyshev", &mesh, b, 1e-12));
+    let unif = spread(&mut *smoother("uniformization", &mesh, b, 1e-12));
     let second: f64 = cheb.iter().enumerate().map(|(i, w)| w * ((i as f64 - 100.0) * 1e-3).powi(2)).sum();
     assert!((second / (b * b / 2.0) - 1.0).abs() < 1e-9, "{second}");
     for (i, (c, u)) in cheb.iter().zip(&unif).enumerate() {
@@ -174,20 +177,23 @@ fn active_cells_give_the_bits_of_the_whole_sweep() {
     for mut s in smoothers(&mesh) {
         let occupied: Vec<u32> = (0..240).collect();
         let mut active = Active::default();
-        active.update(&mesh, &occupied, s.degree());
-        assert!(active.rows.len() < mesh.len());
+        s.plan(&occupied, &mut active);
+        assert!(active.rows.len() < mesh.len() || s.name() == "none");
         let mut field = vec![[0.0; 8]; mesh.len()];
         let mut seed = 11;
         occupied.iter().for_each(|c| field[*c as usize] = [0.0; 8].map(|_: f64| random(&mut seed)));
         let (mut a, mut b) = (field.clone(), field);
-        s.apply(&mut a, &Active::whole(&mesh));
-        s.apply(&mut b, &active);
+        // what an earlier use left in the scratch must not matter
+        let mut scratch = Scratch::default();
+        s.apply(&mut vec![[7.0; 8]; mesh.len()], &Active::whole(mesh.len()), Direction::Gather, &mut scratch);
+        all_of(&mut *s, &mut a);
+        s.apply(&mut b, &active, Direction::Spread, &mut scratch);
         assert!(a == b, "{}: spread", s.name());
         // gather: only occupied cells are read
         let full: Vec<[f64; 8]> = (0..mesh.len()).map(|_| [0.0; 8].map(|_: f64| random(&mut seed))).collect();
         let (mut a, mut b) = (full.clone(), full);
-        s.apply(&mut a, &Active::whole(&mesh));
-        s.apply(&mut b, &active);
+        all_of(&mut *s, &mut a);
+        s.apply(&mut b, &active, Direction::Gather, &mut scratch);
         assert!(occupied.iter().all(|c| a[*c as usize] == b[*c as usize]), "{}: gather", s.name());
     }
 }
@@ -226,8 +232,7 @@ fn exchange(
     let pieces = if cut { hex.pieces(2, |c| usize::from(c[0] >= 3)) } else { hex.whole() };
     let mesh = assemble(&pieces).unwrap();
     let f = fluid(&mesh);
-    let [g, positive]: [Box<dyn Smoother>; 2] =
-        [Box::new(Chebyshev::new(&mesh, 0.015, 1e-4)), Box::new(Uniformization::new(&mesh, 0.015, 1e-4))];
+    let [g, positive] = ["chebyshev", "uniformization"].map(|name| smoother(name, &mesh, 0.015, 1e-4));
     let model_a = !setup.model_b;
     let mut step = CouplingStep::new(mesh, setup, Box::new(ParticleCentroid), g, positive);
     let frames: Vec<Frame> = messages.iter().map(|m| Frame::parse(m).unwrap()).collect();
