@@ -142,7 +142,9 @@ impl Groups {
             None => format!("{} {how}", g.name),
         };
         let logs = g.own_log.iter().chain([&g.log]);
-        let tail: String = logs.map(|l| std::fs::read_to_string(l).unwrap_or_default()).collect();
+        // not always UTF-8: LIGGGHTS may print freed memory behind its last message
+        let read = |l| String::from_utf8_lossy(&std::fs::read(l).unwrap_or_default()).into_owned();
+        let tail: String = logs.map(read).collect();
         let wanted = |l: &&str| {
             (l.contains("ERROR") || l.contains("rror:") || l.contains("voidage:")) && !l.contains("ORTE_")
         };
