@@ -29,6 +29,7 @@ pub mod linearise;
 pub mod step;
 
 pub mod balance;
+pub mod bench;
 pub mod commands;
 pub mod config;
 pub mod sums;

@@ -3,8 +3,8 @@
 //!
 //! `before_fluid`: particles of exchange k in, voidage and sources of fluid step k out (stages 2 to 7).
 //! `after_fluid`: the fluid's answer in, what drives the particles out (stage 9).
-//! Units SI. Does not know processes, files or clocks; owns scratch memory and nothing that changes results,
-//! except the fluid gathered last, which is part of the exchange.
+//! Units SI. Does not know processes or files; times the stages; owns scratch memory and nothing that changes
+//! results, except the last fluid velocity, which is part of the exchange.
 
 use crate::arrange::{Order, Places};
 use crate::balance::{Books, ratio};
@@ -18,6 +18,7 @@ use crate::particles::Particles;
 use crate::scheme::Scheme;
 use crate::smooth::{Active, Smoother};
 use crate::sums::{Sum, norm};
+use std::time::Instant;
 use thiserror::Error;
 
 /// Fields of a cell: eight lanes, smoothed together.
@@ -148,6 +149,20 @@ pub struct Facts {
     pub positive_redone: u64,
 }
 
+/// Wall time of the stages of the last step, s.
+#[derive(Clone, Copy, Debug, Default)]
+#[allow(missing_docs)]
+pub struct Seconds {
+    pub locate: f64,
+    pub arrange: f64,
+    pub map: f64,
+    pub solids: f64,
+    pub forces: f64,
+    pub sources: f64,
+    pub gather: f64,
+    pub drive: f64,
+}
+
 /// The coupling step of one run.
 pub struct CouplingStep {
     /// The coupler's own copy of the mesh.
@@ -184,6 +199,8 @@ pub struct CouplingStep {
     pub facts: Facts,
     /// Action–reaction books.
     pub books: Books,
+    /// What the stages took.
+    pub seconds: Seconds,
 }
 
 /// Lanes of the first pass: ε_s, ε_s U_s (1–3) and, from here, the last fluid velocity.
@@ -228,6 +245,7 @@ impl CouplingStep {
             drive: Drive::default(),
             facts: Facts::default(),
             books: Books::default(),
+            seconds: Seconds::default(),
             mesh,
         }
     }
@@ -247,9 +265,11 @@ impl CouplingStep {
     pub fn before_fluid(&mut self, p: &mut Particles, first: bool) -> Result<(), StepError> {
         self.facts = Facts::default();
         self.locate(p)?;
+        let begin = Instant::now();
         self.mapping.weights(&self.mesh, &p.position, &p.radius, &self.hosts, &mut self.weights);
         self.sources.voidage_old.clone_from(&self.sources.voidage);
         self.use_positive = false;
+        self.seconds.map = begin.elapsed().as_secs_f64();
         loop {
             let degree = self.smoother().degree();
             self.active.update(&self.mesh, self.weights.reached(&self.order.occupied), degree);
@@ -270,6 +290,7 @@ impl CouplingStep {
 
     /// Stage 2: host cells; last hosts are only a guess where to look first.
     fn locate(&mut self, p: &mut Particles) -> Result<(), StepError> {
+        let begin = Instant::now();
         self.hosts.clear();
         let guess = p.id.iter().map(|id| self.last_hosts.get(self.places.of(*id) as usize).copied());
         self.hosts.extend(guess.map(|g| g.unwrap_or(NONE)));
@@ -283,11 +304,14 @@ impl CouplingStep {
             self.hosts[index] = NONE;
             self.facts.excluded += 1;
         }
+        let located = Instant::now();
         self.order.update(self.mesh.len(), &p.id, &self.hosts);
         let ids: Vec<i64> = self.order.list.iter().map(|i| p.id[*i as usize]).collect();
         self.places.update(&ids);
         self.last_hosts.clear();
         self.last_hosts.extend(self.order.list.iter().map(|i| self.hosts[*i as usize]));
+        self.seconds.locate = (located - begin).as_secs_f64();
+        self.seconds.arrange = located.elapsed().as_secs_f64();
         Ok(())
     }
 
@@ -308,6 +332,7 @@ impl CouplingStep {
 
     /// Stage 4 (pass a): ε_s, ε_s U_s and, beside them, G of the last fluid velocity. False if an ε_s is negative.
     fn solids(&mut self, p: &Particles) -> bool {
+        let begin = Instant::now();
         self.clean_work();
         let (mut volume, mut scale, mut momentum) = (Sum::default(), Sum::default(), [Sum::default(); 3]);
         self.weights.deposit(&self.mesh, &self.order.list, &mut self.work, |i| {
@@ -349,6 +374,7 @@ impl CouplingStep {
         self.facts.solid_volume_error = ratio((found.value() - total).abs(), total);
         let gap = [0, 1, 2].map(|a| flux[a].value() - momentum[a].value());
         self.facts.solid_momentum_error = ratio(norm(gap), scale);
+        self.seconds.solids = begin.elapsed().as_secs_f64();
         !negative
     }
 
@@ -369,11 +395,14 @@ impl CouplingStep {
 
     /// Stages 5 to 7 (pass b): drag, prediction, Sp and Su. False if an Sp is negative.
     fn sources_of(&mut self, p: &Particles) -> bool {
+        let begin = Instant::now();
         self.predict(p, false);
+        let predicted = Instant::now();
+        self.seconds.forces = (predicted - begin).as_secs_f64();
         self.clean_work();
-        let (predicted, period) = (&self.predicted, self.setup.period);
+        let (q, period) = (&self.predicted, self.setup.period);
         self.weights.deposit(&self.mesh, &self.order.list, &mut self.work, |i| {
-            linearise(&predicted[i], p.velocity[i], p.ledger[i], period)
+            linearise(&q[i], p.velocity[i], p.ledger[i], period)
         });
         self.smooth_work();
         let mut positive = true;
@@ -383,6 +412,7 @@ impl CouplingStep {
             self.sources.sp[j] = l[0];
             self.sources.su[j] = [l[1], l[2], l[3]];
         }
+        self.seconds.sources = predicted.elapsed().as_secs_f64();
         positive
     }
 
@@ -425,7 +455,10 @@ impl CouplingStep {
 
     /// Stage 9 (pass c): the new fluid smoothed by the same G, read at the particles; the impulse charged.
     pub fn after_fluid(&mut self, p: &Particles, fluid: &Fluid, first: bool) -> Result<(), StepError> {
+        let begin = Instant::now();
         self.take_fluid(fluid)?;
+        let gathered = Instant::now();
+        self.seconds.gather = (gathered - begin).as_secs_f64();
         if first {
             // no fluid step lies behind: K is computed with the fluid as it stands, nothing is charged
             self.predict(p, true);
@@ -467,6 +500,7 @@ impl CouplingStep {
         }
         let [charged, old_ledger, external] = sums.map(|s| s.map(Sum::value));
         self.books = Books { charged, old_ledger, external, scale: scale.value(), reaction: [0.0; 3] };
+        self.seconds.drive = gathered.elapsed().as_secs_f64();
         Ok(())
     }
 
