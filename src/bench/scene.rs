@@ -60,9 +60,14 @@ pub fn bed(size: [f64; 3], n: usize, diameter: f64) -> Particles {
 
 /// Air that rises through the bed.
 pub fn air(mesh: &Mesh) -> Fluid {
-    let wave = |c: &[f64; 3], k: f64| [0.1 * (k * c[1]).sin(), 0.9 + 0.1 * (k * c[0]).cos(), 0.1 * (k * c[2]).sin()];
+    let wave =
+        |c: &[f64; 3], k: f64| [0.1 * (k * c[1]).sin(), 0.9 + 0.1 * (k * c[0]).cos(), 0.1 * (k * c[2]).sin()];
     let field = |k: f64, s: f64| mesh.centre.iter().map(|c| wave(c, k).map(|x| s * x)).collect();
-    Fluid { velocity: field(60.0, 1.0), pressure_gradient: field(80.0, -6000.0), stress_divergence: field(90.0, 1.0) }
+    Fluid {
+        velocity: field(60.0, 1.0),
+        pressure_gradient: field(80.0, -6000.0),
+        stress_divergence: field(90.0, 1.0),
+    }
 }
 
 fn hex(n: [usize; 3], size: [f64; 3]) -> MeshPiece {
@@ -70,36 +75,77 @@ fn hex(n: [usize; 3], size: [f64; 3]) -> MeshPiece {
     let point = |i: usize, j: usize, k: usize| ((k * m[1] + j) * m[0] + i) as u32;
     let cell = |c: [usize; 3]| ((c[2] * n[1] + c[1]) * n[0] + c[0]) as u32;
     let mut p = MeshPiece { face_starts: vec![0], ..MeshPiece::default() };
-    for k in 0..m[2] { for j in 0..m[1] { for i in 0..m[0] {
-        let at = [i, j, k];
-        p.points.push([0, 1, 2].map(|a| size[a] * at[a] as f64 / n[a] as f64));
-    } } }
+    for k in 0..m[2] {
+        for j in 0..m[1] {
+            for i in 0..m[0] {
+                let at = [i, j, k];
+                p.points.push([0, 1, 2].map(|a| size[a] * at[a] as f64 / n[a] as f64));
+            }
+        }
+    }
     p.cell_ids = (0..(n[0] * n[1] * n[2]) as i64).collect();
     let face = |c: [usize; 3], axis: usize, high: bool| {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        let mut l: Vec<u32> = [(0, 0), (1, 0), (1, 1), (0, 1)].iter().map(|(du, dv)| {
-            let mut q = c; q[axis] += usize::from(high); q[u] += du; q[v] += dv; point(q[0], q[1], q[2])
-        }).collect();
-        if !high { l.reverse(); }
+        let mut l: Vec<u32> = [(0, 0), (1, 0), (1, 1), (0, 1)]
+            .iter()
+            .map(|(du, dv)| {
+                let mut q = c;
+                q[axis] += usize::from(high);
+                q[u] += du;
+                q[v] += dv;
+                point(q[0], q[1], q[2])
+            })
+            .collect();
+        if !high {
+            l.reverse();
+        }
         l
     };
-    let each = |f: &mut dyn FnMut([usize; 3])| for k in 0..n[2] { for j in 0..n[1] { for i in 0..n[0] { f([i, j, k]) } } };
-    let mut owner = Vec::new(); let mut neighbour = Vec::new();
-    each(&mut |c| for axis in 0..3 {
-        let mut d = c; d[axis] += 1;
-        if d[axis] < n[axis] {
-            p.face_points.extend(face(c, axis, true)); p.face_starts.push(p.face_points.len() as u32);
-            owner.push(cell(c)); neighbour.push(cell(d));
+    let each = |f: &mut dyn FnMut([usize; 3])| {
+        for k in 0..n[2] {
+            for j in 0..n[1] {
+                for i in 0..n[0] {
+                    f([i, j, k])
+                }
+            }
+        }
+    };
+    let mut owner = Vec::new();
+    let mut neighbour = Vec::new();
+    each(&mut |c| {
+        for axis in 0..3 {
+            let mut d = c;
+            d[axis] += 1;
+            if d[axis] < n[axis] {
+                p.face_points.extend(face(c, axis, true));
+                p.face_starts.push(p.face_points.len() as u32);
+                owner.push(cell(c));
+                neighbour.push(cell(d));
+            }
         }
     });
     let start = owner.len();
-    each(&mut |c| for axis in 0..3 { for high in [false, true] {
-        if c[axis] == if high { n[axis] - 1 } else { 0 } {
-            p.face_points.extend(face(c, axis, high)); p.face_starts.push(p.face_points.len() as u32);
-            owner.push(cell(c));
+    each(&mut |c| {
+        for axis in 0..3 {
+            for high in [false, true] {
+                if c[axis] == if high { n[axis] - 1 } else { 0 } {
+                    p.face_points.extend(face(c, axis, high));
+                    p.face_starts.push(p.face_points.len() as u32);
+                    owner.push(cell(c));
+                }
+            }
         }
-    } });
-    p.patches.push(Patch { kind: PatchKind::Boundary, name: "walls".into(), start, size: owner.len() - start, neighbour_rank: 0, neighbour_patch: 0, separation: [0.0; 3] });
-    p.owner = owner; p.neighbour = neighbour;
+    });
+    p.patches.push(Patch {
+        kind: PatchKind::Boundary,
+        name: "walls".into(),
+        start,
+        size: owner.len() - start,
+        neighbour_rank: 0,
+        neighbour_patch: 0,
+        separation: [0.0; 3],
+    });
+    p.owner = owner;
+    p.neighbour = neighbour;
     p
 }

@@ -97,7 +97,8 @@ pub fn run(case: &Case) -> Result<Cost, String> {
     let mut step = CouplingStep::new(mesh, setup(case.drag)?, mapping, main, positive);
     let mut p = scene::bed(scene::BOX, case.particles, scene::DIAMETER);
     let mut seed = 7;
-    let mut cost = Cost { particles: p.len(), cells, degree, us_per_particle: f64::INFINITY, ..Cost::default() };
+    let mut cost =
+        Cost { particles: p.len(), cells, degree, us_per_particle: f64::INFINITY, ..Cost::default() };
     let mut all = Vec::new();
     for k in 0..=case.repetitions {
         let begin = Instant::now();

@@ -6,7 +6,8 @@ use std::time::Instant;
 /// GB/s of the triad on `bytes` in all three arrays together; counted: two reads and one write. Best of `times`.
 pub fn bandwidth(bytes: usize, threads: usize, times: usize) -> f64 {
     let n = (bytes / 24 / threads.max(1)).max(1000);
-    let mut arrays: Vec<_> = (0..threads.max(1)).map(|_| [vec![0.0f64; n], vec![1.0; n], vec![2.0; n]]).collect();
+    let mut arrays: Vec<_> =
+        (0..threads.max(1)).map(|_| [vec![0.0f64; n], vec![1.0; n], vec![2.0; n]]).collect();
     let mut best = f64::INFINITY;
     for k in 0..=times {
         let s = k as f64;
