@@ -2,5 +2,6 @@
 //! `voidage bench`: what the coupling step costs and how exact it is, on scenes made here.
 
 pub mod scene;
+pub mod smoother;
 pub mod step;
 pub mod triad;

@@ -7,17 +7,23 @@
 //! Does not know particles.
 
 mod active;
+mod average;
 pub mod coefficients;
 mod diffusion;
+mod direct;
 mod field;
 mod graph;
+mod pcg;
 mod polynomial;
 mod sweep;
 
 pub use active::Active;
+pub use average::TimeAverage;
 pub use diffusion::Diffusion;
+pub use direct::Direct;
 pub use field::{Field, Scratch};
 pub use graph::Graph;
+pub use pcg::Implicit;
 pub use polynomial::{Polynomial, Single};
 
 use crate::mesh::Mesh;
@@ -108,7 +114,22 @@ impl Smoother for Unsmoothed {
 }
 
 /// Names in case.toml.
-pub const NAMES: &[&str] = &["chebyshev", "chebyshev-u", "uniformization", "none"];
+pub const NAMES: &[&str] = &[
+    "chebyshev",
+    "chebyshev-u",
+    "uniformization",
+    "crank-nicolson",
+    "crank-nicolson-1",
+    "backward-euler",
+    "constdiff",
+    "direct",
+    "none",
+];
+
+/// Residual at which the implicit solves end, relative to the first (the papers' baseline).
+const SOLVED: f64 = 1e-6;
+/// Steps of `backward-euler`.
+const EULER_STEPS: usize = 4;
 
 /// The smoother of that name; `diffusion`: T of each link of the mesh (m2), see [`Diffusion`].
 pub fn by_name(name: &str, mesh: &Mesh, diffusion: &[f64], tolerance: f64) -> Option<Box<dyn Smoother>> {
@@ -124,12 +145,23 @@ pub fn pair(name: &str, mesh: &Mesh, diffusion: &[f64], tolerance: f64) -> Optio
 }
 
 /// On a graph made already.
-pub fn on(name: &str, _: &Mesh, _: &[f64], graph: &Arc<Graph>, tolerance: f64) -> Option<Box<dyn Smoother>> {
+pub fn on(
+    name: &str,
+    mesh: &Mesh,
+    t: &[f64],
+    graph: &Arc<Graph>,
+    tolerance: f64,
+) -> Option<Box<dyn Smoother>> {
     let graph = Arc::clone(graph);
     Some(match name {
         "chebyshev" => Box::new(Polynomial::chebyshev(graph, tolerance, true)),
         "chebyshev-u" => Box::new(Polynomial::second_kind(graph, tolerance)),
         "uniformization" => Box::new(Polynomial::uniformization(graph, tolerance)),
+        "crank-nicolson" => Box::new(Implicit::new("crank-nicolson", mesh, t, 3, 0.5, SOLVED)),
+        "crank-nicolson-1" => Box::new(Implicit::new("crank-nicolson-1", mesh, t, 1, 0.5, SOLVED)),
+        "backward-euler" => Box::new(Implicit::new("backward-euler", mesh, t, EULER_STEPS, 1.0, SOLVED)),
+        "constdiff" => Box::new(Implicit::new("constdiff", mesh, t, 1, 1.0, SOLVED)),
+        "direct" => Box::new(Direct::new(mesh, t)?),
         "none" => Box::new(Unsmoothed),
         _ => return None,
     })
