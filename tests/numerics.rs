@@ -9,6 +9,7 @@ use voidage::couple::receive_mesh;
 use voidage::interpolate::FluidVelocity;
 use voidage::locate::Locator;
 use voidage::map::ParticleCentroid;
+use voidage::mesh::made::Made;
 use voidage::mesh::{Mesh, NONE, assemble};
 use voidage::particles::Particles;
 use voidage::smooth::{self, Active, Diffusion, Direction, Scratch, Smoother, Unsmoothed};
@@ -111,7 +112,7 @@ fn smoother(name: &str, mesh: &Mesh, bandwidth: f64, tolerance: f64) -> Box<dyn 
 
 fn smoothers(mesh: &Mesh) -> Vec<Box<dyn Smoother>> {
     let of = |name: &&str| [1e-2, 1e-9].map(|t| smoother(name, mesh, 0.02, t));
-    smooth::NAMES.iter().flat_map(of).collect()
+    smooth::NAMES.iter().flat_map(of).filter(|s| s.properties().conservative).collect()
 }
 
 fn all_of(s: &mut dyn Smoother, lanes: &mut [[f64; 8]]) {
@@ -197,6 +198,94 @@ fn active_cells_give_the_bits_of_the_whole_sweep() {
         s.apply(&mut b, &active, Direction::Gather, &mut scratch);
         assert!(occupied.iter().all(|c| a[*c as usize] == b[*c as usize]), "{}: gather", s.name());
     }
+}
+
+#[test]
+fn threads_and_numbering_do_not_change_a_bit() {
+    let mesh = Made::tet([9, 8, 7], SIZE).mesh();
+    let t = Diffusion::uniform(0.012).links(&mesh);
+    let mut seed = 3;
+    let field: Vec<[f64; 8]> = (0..mesh.len()).map(|_| [0.0; 8].map(|_: f64| random(&mut seed))).collect();
+    // the same cells numbered at random: rows are then renumbered
+    let mut ids: Vec<usize> = (0..mesh.len()).collect();
+    for i in (1..ids.len()).rev() {
+        ids.swap(i, (random(&mut seed) * (i + 1) as f64) as usize);
+    }
+    let mut pieces = Made::tet([9, 8, 7], SIZE).pieces(1, |_| 0);
+    pieces[0].cell_ids = ids.iter().map(|i| *i as i64).collect();
+    let mixed = assemble(&pieces).unwrap();
+    assert!(smooth::Graph::new(&mixed, &Diffusion::uniform(0.012).links(&mixed)).renumbered());
+    for name in ["chebyshev", "uniformization"] {
+        let run = |threads: usize| {
+            let mut out = field.clone();
+            let mut s = smooth::by_name(name, &mesh, &t, 1e-6).unwrap();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| all_of(&mut *s, &mut out));
+            out
+        };
+        let mut serial = field.clone();
+        all_of(&mut *smooth::by_name(name, &mesh, &t, 1e-6).unwrap(), &mut serial);
+        assert!([1, 2, 4].iter().all(|n| run(*n) == serial), "{name}: threads");
+        // sums in a row run in the order of the slots, so other ids give other last bits
+        let mut out = vec![[0.0; 8]; mesh.len()];
+        (0..ids.len()).for_each(|i| out[ids[i]] = field[i]);
+        all_of(&mut *smoother(name, &mixed, 0.012, 1e-6), &mut out);
+        assert!((0..ids.len()).all(|i| (out[ids[i]][0] - serial[i][0]).abs() < 1e-13), "{name}: numbers");
+    }
+}
+
+#[test]
+fn implicit_solves_agree_with_the_direct_one_and_the_exponential() {
+    for made in [Made::hex([8, 7, 6], SIZE), Made::tet([5, 4, 4], SIZE), Made::poly([6, 5, 5], SIZE)] {
+        let mesh = made.mesh();
+        let mut field = vec![[0.0; 8]; mesh.len()];
+        let mut seed = 9;
+        field.iter_mut().for_each(|f| *f = [0.0; 8].map(|_: f64| random(&mut seed)));
+        let of = |name: &str| {
+            let mut out = field.clone();
+            all_of(&mut *smoother(name, &mesh, 0.008, 1e-9), &mut out);
+            out
+        };
+        let gap = |a: &[[f64; 8]], b: &[[f64; 8]]| {
+            let all = a.iter().zip(b).flat_map(|(a, b)| (0..8).map(|l| (a[l] - b[l]).powi(2)));
+            (sum(all) / (8 * mesh.len()) as f64).sqrt()
+        };
+        let (exact, one) = (of("chebyshev"), of("direct"));
+        assert!(gap(&of("constdiff"), &one) < 1e-6);
+        assert!(gap(&of("uniformization"), &exact) < 1e-8);
+        let (four, cn) = (gap(&of("backward-euler"), &exact), gap(&of("crank-nicolson"), &exact));
+        assert!(four < 0.5 * gap(&one, &exact) && four > 1e-4, "{four}");
+        assert!(cn < 0.1, "{cn}");
+    }
+}
+
+#[test]
+fn f32_conserves_and_cells_that_are_too_large_keep_what_they_have() {
+    let mesh = Made::graded([10, 6, 8], SIZE).mesh();
+    let t = Diffusion::uniform(0.01).links(&mesh);
+    let mut seed = 9;
+    let field: Vec<[f64; 8]> =
+        (0..mesh.len()).map(|_| [0.0; 8].map(|_: f64| random(&mut seed) - 0.3)).collect();
+    let graph = std::sync::Arc::new(smooth::Graph::new(&mesh, &t));
+    let polynomial = smooth::Polynomial::chebyshev(graph, 1e-4, false);
+    let (mut double, mut single) = (field.clone(), field.clone());
+    all_of(&mut polynomial.clone(), &mut double);
+    polynomial.single().apply(&mut single, &mesh.volume, &Active::whole(mesh.len()), Direction::Spread);
+    let total = |f: &[[f64; 8]], l: usize| sum(f.iter().zip(&mesh.volume).map(|(f, v)| f[l] * v));
+    for l in 0..8 {
+        let size = sum(field.iter().zip(&mesh.volume).map(|(f, v)| f[l].abs() * v));
+        assert!((total(&single, l) - total(&field, l)).abs() < 1e-15 * size);
+        assert!(double.iter().zip(&single).all(|(a, b)| (a[l] - b[l]).abs() < 1e-5));
+    }
+    let limit = 0.006;
+    let t = Diffusion { bandwidth: 0.01, largest_cell: limit, ..Diffusion::default() }.links(&mesh);
+    let mut out = field.clone();
+    all_of(&mut *smooth::by_name("chebyshev", &mesh, &t, 1e-4).unwrap(), &mut out);
+    let large = |c: &usize| mesh.volume[*c].cbrt() > limit;
+    let (kept, moved): (Vec<usize>, Vec<usize>) = (0..mesh.len()).partition(large);
+    assert!(!kept.is_empty() && kept.iter().all(|c| (out[*c][0] - field[*c][0]).abs() < 1e-14));
+    assert!(moved.iter().any(|c| out[*c][0] != field[*c][0]));
+    assert!((total(&out, 0) / total(&field, 0) - 1.0).abs() < 1e-13);
 }
 
 fn setup(scheme: &str, fluid_velocity: FluidVelocity, model_b: bool) -> Setup {

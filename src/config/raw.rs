@@ -300,7 +300,12 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("coupling.feedback", "", "two-way", "two-way | one-way"),
     ("coupling.continuity", "", "voidage-rate", "voidage-rate (d eps/dt) | solids-flux (SX eq. 2a)"),
     ("map.method", "", "particle-centroid", "particle-centroid"),
-    ("smooth.method", "", "chebyshev", "chebyshev | uniformization (positive by proof) | none"),
+    (
+        "smooth.method",
+        "",
+        "chebyshev",
+        "chebyshev | chebyshev-u | uniformization (positive by proof) | crank-nicolson | crank-nicolson-1 | backward-euler | constdiff | direct | none",
+    ),
     ("smooth.bandwidth", "m", "-", "b of the Gaussian exp(-r2/b2); 4 to 6 particle diameters"),
     (
         "smooth.tolerance",
