@@ -13,22 +13,23 @@
 use super::active::BLOCK;
 use super::graph::{Graph, Rows};
 use super::{Active, Direction};
+use pulp::{Simd, WithSimd};
 
-/// A number of the sweeps.
-pub trait Real:
-    Copy
-    + Send
-    + Sync
-    + std::ops::Add<Output = Self>
-    + std::ops::Sub<Output = Self>
-    + std::ops::Mul<Output = Self>
-{
-    /// 0
+/// A number of the sweeps, and its vectors (at most eight lanes each) on the machine at hand.
+#[allow(missing_docs)]
+pub trait Real: Copy + Send + Sync {
     const ZERO: Self;
     /// rounded
     fn from_f64(x: f64) -> Self;
     /// exact
     fn to_f64(self) -> f64;
+    type Of<S: Simd>: Copy;
+    fn vectors<S: Simd>(x: &[Self; 8]) -> &[Self::Of<S>];
+    fn vectors_mut<S: Simd>(x: &mut [Self; 8]) -> &mut [Self::Of<S>];
+    fn splat<S: Simd>(s: S, x: Self) -> Self::Of<S>;
+    fn add<S: Simd>(s: S, a: Self::Of<S>, b: Self::Of<S>) -> Self::Of<S>;
+    fn sub<S: Simd>(s: S, a: Self::Of<S>, b: Self::Of<S>) -> Self::Of<S>;
+    fn mul<S: Simd>(s: S, a: Self::Of<S>, b: Self::Of<S>) -> Self::Of<S>;
 }
 impl Real for f64 {
     const ZERO: Self = 0.0;
@@ -38,6 +39,31 @@ impl Real for f64 {
     fn to_f64(self) -> f64 {
         self
     }
+    type Of<S: Simd> = S::f64s;
+    #[inline(always)]
+    fn vectors<S: Simd>(x: &[Self; 8]) -> &[S::f64s] {
+        S::as_simd_f64s(x).0
+    }
+    #[inline(always)]
+    fn vectors_mut<S: Simd>(x: &mut [Self; 8]) -> &mut [S::f64s] {
+        S::as_mut_simd_f64s(x).0
+    }
+    #[inline(always)]
+    fn splat<S: Simd>(s: S, x: Self) -> S::f64s {
+        s.splat_f64s(x)
+    }
+    #[inline(always)]
+    fn add<S: Simd>(s: S, a: S::f64s, b: S::f64s) -> S::f64s {
+        s.add_f64s(a, b)
+    }
+    #[inline(always)]
+    fn sub<S: Simd>(s: S, a: S::f64s, b: S::f64s) -> S::f64s {
+        s.sub_f64s(a, b)
+    }
+    #[inline(always)]
+    fn mul<S: Simd>(s: S, a: S::f64s, b: S::f64s) -> S::f64s {
+        s.mul_f64s(a, b)
+    }
 }
 impl Real for f32 {
     const ZERO: Self = 0.0;
@@ -46,6 +72,31 @@ impl Real for f32 {
     }
     fn to_f64(self) -> f64 {
         f64::from(self)
+    }
+    type Of<S: Simd> = S::f32s;
+    #[inline(always)]
+    fn vectors<S: Simd>(x: &[Self; 8]) -> &[S::f32s] {
+        S::as_simd_f32s(x).0
+    }
+    #[inline(always)]
+    fn vectors_mut<S: Simd>(x: &mut [Self; 8]) -> &mut [S::f32s] {
+        S::as_mut_simd_f32s(x).0
+    }
+    #[inline(always)]
+    fn splat<S: Simd>(s: S, x: Self) -> S::f32s {
+        s.splat_f32s(x)
+    }
+    #[inline(always)]
+    fn add<S: Simd>(s: S, a: S::f32s, b: S::f32s) -> S::f32s {
+        s.add_f32s(a, b)
+    }
+    #[inline(always)]
+    fn sub<S: Simd>(s: S, a: S::f32s, b: S::f32s) -> S::f32s {
+        s.sub_f32s(a, b)
+    }
+    #[inline(always)]
+    fn mul<S: Simd>(s: S, a: S::f32s, b: S::f32s) -> S::f32s {
+        s.mul_f32s(a, b)
     }
 }
 
@@ -98,12 +149,13 @@ struct Part<'a, T, const KIND: u8> {
     out: &'a mut [[T; 8]],
 }
 
-impl<T: Real, const KIND: u8> pulp::NullaryFnOnce for Part<'_, T, KIND> {
+impl<T: Real, const KIND: u8> WithSimd for Part<'_, T, KIND> {
     type Output = ();
     #[inline(always)]
-    fn call(self) {
+    fn with_simd<S: Simd>(self, v: S) {
         let Self { sweep: s, first_block, other, out } = self;
         let first_row = first_block * BLOCK;
+        let [alpha, gamma, scale] = [s.alpha, s.gamma, s.scale].map(|x| T::splat(v, x));
         for (b, out) in out.chunks_mut(BLOCK).enumerate() {
             let ring = s.blocks[first_block + b];
             if ring > s.reach {
@@ -123,23 +175,23 @@ impl<T: Real, const KIND: u8> pulp::NullaryFnOnce for Part<'_, T, KIND> {
                 let (to_row, to_rest) = to.split_at(n);
                 let (a_row, a_rest) = a.split_at(n);
                 (to, a) = (to_rest, a_rest);
-                let own = &own[i];
-                let mut flux = [T::ZERO; 8];
-                for (a, to) in a_row.iter().zip(to_row) {
-                    let far = &s.now[*to as usize];
-                    for l in 0..8 {
-                        flux[l] = flux[l] + *a * (own[l] - far[l]);
+                let out = T::vectors_mut::<S>(&mut out[i]);
+                for (p, out) in out.iter_mut().enumerate() {
+                    let x = T::vectors::<S>(&own[i])[p];
+                    let mut flux = T::splat(v, T::ZERO);
+                    for (a, to) in a_row.iter().zip(to_row) {
+                        let far = T::vectors::<S>(&s.now[*to as usize])[p];
+                        flux = T::add(v, flux, T::mul(v, T::splat(v, *a), T::sub(v, x, far)));
                     }
-                }
-                let out = &mut out[i];
-                for l in 0..8 {
-                    let x = s.gamma * (own[l] - s.scale * flux[l]);
-                    out[l] = match KIND {
-                        OF_ITSELF => s.alpha * own[l] + x,
-                        TWO_TERMS => s.alpha * other[i][l] + x,
-                        THREE_TERMS => s.alpha * other[i][l] + x - out[l],
-                        LAST_TWO_TERMS => s.alpha * out[l] + x,
-                        _ => s.alpha * out[l] + x - other[i][l],
+                    let now = T::mul(v, gamma, T::sub(v, x, T::mul(v, scale, flux)));
+                    let of = |y| T::add(v, T::mul(v, alpha, y), now);
+                    let other = |i: usize| T::vectors::<S>(&other[i])[p];
+                    *out = match KIND {
+                        OF_ITSELF => of(x),
+                        TWO_TERMS => of(other(i)),
+                        THREE_TERMS => T::sub(v, of(other(i)), *out),
+                        LAST_TWO_TERMS => of(*out),
+                        _ => T::sub(v, of(*out), other(i)),
                     };
                 }
             }
@@ -232,7 +284,7 @@ pub(super) fn apply<T: Real>(
     }
     if m == 1 {
         for (to, from) in now.iter_mut().zip(field.iter()) {
-            *to = from.map(|x| T::from_f64(top) * x);
+            *to = from.map(|x| T::from_f64(top * x.to_f64()));
         }
         let all = Sweeps { rows, r, active, direction };
         return all.at(0, r.alpha[0], now, false).run::<LAST_TWO_TERMS>(cuts, &[], field);
