@@ -24,6 +24,7 @@ pub trait Real: Copy + Send + Sync {
     /// exact
     fn to_f64(self) -> f64;
     type Of<S: Simd>: Copy;
+    fn dispatch<W: WithSimd>(work: W) -> W::Output;
     fn vectors<S: Simd>(x: &[Self; 8]) -> &[Self::Of<S>];
     fn vectors_mut<S: Simd>(x: &mut [Self; 8]) -> &mut [Self::Of<S>];
     fn splat<S: Simd>(s: S, x: Self) -> Self::Of<S>;
@@ -40,6 +41,9 @@ impl Real for f64 {
         self
     }
     type Of<S: Simd> = S::f64s;
+    fn dispatch<W: WithSimd>(work: W) -> W::Output {
+        pulp::Arch::new().dispatch(work)
+    }
     #[inline(always)]
     fn vectors<S: Simd>(x: &[Self; 8]) -> &[S::f64s] {
         S::as_simd_f64s(x).0
@@ -74,6 +78,14 @@ impl Real for f32 {
         f64::from(self)
     }
     type Of<S: Simd> = S::f32s;
+    /// Not by the widest vectors: a cell has eight lanes, AVX-512 would want sixteen.
+    fn dispatch<W: WithSimd>(work: W) -> W::Output {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(v) = pulp::x86::V3::try_new() {
+            return Simd::vectorize(v, work);
+        }
+        Simd::vectorize(pulp::Scalar::new(), work)
+    }
     #[inline(always)]
     fn vectors<S: Simd>(x: &[Self; 8]) -> &[S::f32s] {
         S::as_simd_f32s(x).0
@@ -202,9 +214,7 @@ impl<T: Real, const KIND: u8> WithSimd for Part<'_, T, KIND> {
 impl<T: Real> Sweep<'_, T> {
     /// Runs it on every thread of the pool; `cuts`: first block of each thread and the end.
     fn run<const KIND: u8>(&self, cuts: &[usize], other: &[[T; 8]], mut out: &mut [[T; 8]]) {
-        let part = |first_block, out| {
-            pulp::Arch::new().dispatch(Part::<T, KIND> { sweep: self, first_block, other, out })
-        };
+        let part = |first_block, out| T::dispatch(Part::<T, KIND> { sweep: self, first_block, other, out });
         if cuts.len() == 2 {
             return part(0, out);
         }
