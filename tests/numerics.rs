@@ -419,3 +419,33 @@ fn the_mesh_comes_through_the_wire() {
     );
     assert!(receive_mesh(&mut none).is_err(), "no CFD rank, no mesh");
 }
+
+#[test]
+fn the_kernel_is_isotropic_on_polyhedra_and_tetrahedra() {
+    // variance along each axis of a point source, relative to b²/2; bounds: measured, rounded up
+    let size = [0.06; 3];
+    let shapes = [
+        (Made::hex([30; 3], size), 2e-5, 1e-9),
+        (Made::poly([24; 3], size), 5e-3, 5e-3),
+        (Made::tet([16; 3], size), 0.04, 0.01),
+    ];
+    for (made, bias, spread) in shapes {
+        let mesh = made.mesh();
+        let b = 0.008;
+        let near = |c: &[f64; 3]| c.iter().map(|x| (x - 0.03).powi(2)).sum::<f64>();
+        let all = 0..mesh.len();
+        let at = all.min_by(|i, j| near(&mesh.centre[*i]).total_cmp(&near(&mesh.centre[*j]))).unwrap();
+        let mut f = vec![[0.0; 8]; mesh.len()];
+        f[at] = [1.0 / mesh.volume[at]; 8];
+        all_of(&mut *smoother("chebyshev", &mesh, b, 1e-8), &mut f);
+        let moment = |g: &dyn Fn(usize) -> f64| sum((0..mesh.len()).map(|c| mesh.volume[c] * f[c][0] * g(c)));
+        let ratio = [0, 1, 2].map(|a| {
+            let mean = moment(&|c| mesh.centre[c][a]);
+            moment(&|c| (mesh.centre[c][a] - mean).powi(2)) / (0.5 * b * b)
+        });
+        println!("{:?}: {ratio:?}", made.shape);
+        let mean = ratio.iter().sum::<f64>() / 3.0;
+        assert!((mean - 1.0).abs() < bias, "{:?} {ratio:?}", made.shape);
+        assert!(ratio.iter().all(|r| (r - mean).abs() < spread), "{:?} {ratio:?}", made.shape);
+    }
+}

@@ -5,6 +5,10 @@
 //! conserves Σ V φ, preserves constants, keeps signs and is self-adjoint in the V inner product; every smoother
 //! says which of these it keeps, its error and its cost. New smoothers implement `Smoother` and join `by_name`.
 //! Does not know particles.
+//!
+//! Measured on made meshes (b = 8 mm, point source; variance along x, y, z relative to b²/2): hexahedra 1.0000 in all
+//! three; polyhedra (plane faces, seeds jiggled by 20 %) 0.998, 1.000, 1.000; jiggled tetrahedra 1.031, 1.024, 1.021.
+//! The two-point flux has no non-orthogonal correction: the kernel is then 2 to 3 % too wide in variance.
 
 mod active;
 mod average;
