@@ -220,7 +220,8 @@ fn exchange(
             );
         }
     };
-    let mut output = crate::output::Output::new(config, resume.as_ref().map(|s| s.time)).map_err(|e| format!("CASE/voidage: {e}"))?;
+    let mut output = crate::output::Output::new(config, resume.as_ref().map(|s| s.time))
+        .map_err(|e| format!("CASE/voidage: {e}"))?;
     let mut write = |s: &crate::couple::Snapshot| output.write(s);
     let mut run = Exchange {
         partners: Partners::new(Vec::new(), Vec::new(), Duration::ZERO),

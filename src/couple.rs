@@ -8,8 +8,8 @@
 use crate::balance::Books;
 use crate::mesh::{self, Mesh, MeshPiece};
 use crate::monitor::{Monitor, Row};
-use crate::particles::{ParticleError, Particles};
 use crate::output::restart::{self, Sets, State};
+use crate::particles::{ParticleError, Particles};
 use crate::partners::{PartnerError, Partners};
 use crate::step::{CouplingStep, Fluid, StepError};
 use crate::sums::norm;
@@ -183,6 +183,9 @@ impl<T: Transport> Exchange<'_, T> {
                 Some(sets) if write && !first => Some(sets.begin(time).map_err(file)?),
                 _ => None,
             };
+            if last {
+                self.partners.release_cfd();
+            }
             if last && set.is_none() {
                 self.partners.stop("");
             } else {
@@ -264,19 +267,27 @@ impl<T: Transport> Exchange<'_, T> {
         self.receive_fluid(k, &mut fluid, &mut waited)?;
         let mesh = &self.step.mesh;
         if s.cells != mesh.ids.len() || s.mesh_sum != restart::mesh_sum(&mesh.ids, &mesh.volume) {
-            return Err(refuse(format!("it belongs to another mesh ({} cells, now {})", s.cells, mesh.ids.len())));
+            return Err(refuse(format!(
+                "it belongs to another mesh ({} cells, now {})",
+                s.cells,
+                mesh.ids.len()
+            )));
         }
         let size = s.velocity.iter().map(|v| norm(*v)).fold(0.0, f64::max);
         let gap = s.velocity.iter().zip(&fluid.velocity).map(|(a, b)| norm([0, 1, 2].map(|c| a[c] - b[c])));
         let gap = gap.fold(0.0, f64::max);
         // the fluid's files may be text: six digits are the least OpenFOAM writes by default
         if gap > 1e-4 * size {
-            return Err(refuse(format!("the fluid's fields are not those it was written with (U differs by {gap:e} m/s)")));
+            return Err(refuse(format!(
+                "the fluid's fields are not those it was written with (U differs by {gap:e} m/s)"
+            )));
         }
         let p = self.receive_particles(k)?;
         if p.len() != s.particles || restart::particles_sum(&p) != s.particles_sum {
             let (was, now) = (s.particles, p.len());
-            return Err(refuse(format!("the DEM brought other particles back ({was} were saved, {now} came, or their values changed after read_restart)")));
+            return Err(refuse(format!(
+                "the DEM brought other particles back ({was} were saved, {now} came, or their values changed after read_restart)"
+            )));
         }
         self.step.restore(&s.voidage, &s.velocity);
         self.send_sources(k, s.time)?;

@@ -68,7 +68,8 @@ impl Monitor {
     /// Goes on with the file after a restart: rows from exchange `step` on are dropped, the run writes them anew.
     pub fn resume(path: &Path, step: i64) -> std::io::Result<Self> {
         let text = std::fs::read_to_string(path).unwrap_or_default();
-        let earlier = |l: &&str| l.split(',').next().and_then(|n| n.parse::<i64>().ok()).is_none_or(|n| n < step);
+        let earlier =
+            |l: &&str| l.split(',').next().and_then(|n| n.parse::<i64>().ok()).is_none_or(|n| n < step);
         let kept: Vec<&str> = text.lines().filter(earlier).collect();
         if kept.is_empty() {
             return Self::create(path, false);

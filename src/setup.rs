@@ -87,11 +87,7 @@ pub fn welcome(c: &Config, resume: Option<&State>) -> Welcome {
 }
 
 /// The programs must agree on time steps; each says its own in its hello.
-pub fn agree<T: Transport>(
-    c: &Config,
-    partners: &Partners<T>,
-    resume: Option<&State>,
-) -> Result<(), String> {
+pub fn agree<T: Transport>(c: &Config, partners: &Partners<T>, resume: Option<&State>) -> Result<(), String> {
     for i in partners.dem().chain(partners.cfd()) {
         let Some(h) = partners.hello(i) else { continue };
         let dem = partners.dem().contains(&i);

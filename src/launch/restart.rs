@@ -31,11 +31,19 @@ fn time_folder(case: &Path, time: f64, slack: f64) -> Option<PathBuf> {
 /// The newest set of a case, or that of `time` (s). All that does not match is an error.
 pub fn find(c: &Config, time: Option<f64>) -> Result<Restart, Vec<Problem>> {
     let all = sets(&c.folder);
-    let one = |place: &str, given: String, accepted: &str, fix: &str| vec![Problem::error(place, given, accepted, fix)];
+    let one = |place: &str, given: String, accepted: &str, fix: &str| {
+        vec![Problem::error(place, given, accepted, fix)]
+    };
     let place = folder(&c.folder).display().to_string();
     let Some(newest) = all.last() else {
-        let accepted = "there is no restart set; they are written at the fluid's write times (output.restarts > 0)";
-        return Err(one(&place, "nothing to restart from".into(), accepted, "run the case without --restart first"));
+        let accepted =
+            "there is no restart set; they are written at the fluid's write times (output.restarts > 0)";
+        return Err(one(
+            &place,
+            "nothing to restart from".into(),
+            accepted,
+            "run the case without --restart first",
+        ));
     };
     let slack = 1e-2 * c.period();
     let chosen = match time {
@@ -79,8 +87,11 @@ fn mismatches(c: &Config, r: &Restart) -> Vec<Problem> {
             n => (0..n).map(|i| case.join(format!("processor{i}"))).collect(),
         };
         for place in places {
-            if time_folder(&place, s.time, 1e-2 * c.period()).is_none_or(|t| !t.join("U").exists() && !t.join("U.gz").exists()) {
-                let accepted = format!("the fluid has no fields of t = {}, the time of the restart set", s.time);
+            if time_folder(&place, s.time, 1e-2 * c.period())
+                .is_none_or(|t| !t.join("U").exists() && !t.join("U.gz").exists())
+            {
+                let accepted =
+                    format!("the fluid has no fields of t = {}, the time of the restart set", s.time);
                 let fix = "name another set: --restart=TIME (purgeWrite of controlDict may have removed the fields)";
                 p.push(Problem::error("fluid", place.display(), &accepted, fix));
             }

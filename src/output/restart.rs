@@ -98,7 +98,11 @@ pub fn particles_sum(p: &Particles) -> String {
     let mut sum = Sum64::default();
     for i in order {
         sum.word(p.id[i] as u64);
-        p.velocity[i].iter().chain(&p.ledger[i]).chain([&p.radius[i], &p.mass[i]]).for_each(|x| sum.number(*x));
+        p.velocity[i]
+            .iter()
+            .chain(&p.ledger[i])
+            .chain([&p.radius[i], &p.mass[i]])
+            .for_each(|x| sum.number(*x));
     }
     sum.text()
 }
@@ -132,8 +136,13 @@ impl State {
     pub fn decode(bytes: &[u8]) -> Result<Self, String> {
         let line = bytes.iter().position(|b| *b == b'\n').map_or(&[][..], |i| &bytes[..=i]);
         if line != MAGIC {
-            let what = String::from_utf8_lossy(line.get(..line.len().min(40)).unwrap_or_default()).into_owned();
-            return Err(format!("it begins with {:?}; this version reads {:?}", what.trim(), "voidage restart 1"));
+            let what =
+                String::from_utf8_lossy(line.get(..line.len().min(40)).unwrap_or_default()).into_owned();
+            return Err(format!(
+                "it begins with {:?}; this version reads {:?}",
+                what.trim(),
+                "voidage restart 1"
+            ));
         }
         let damaged = || "it is damaged (checksum or length)".to_string();
         let (body, end) = bytes.split_at_checked(bytes.len().saturating_sub(8)).ok_or_else(damaged)?;
@@ -153,7 +162,8 @@ impl State {
         let mut state: Self = toml::from_str(head).map_err(|e| e.message().to_string())?;
         let at = at + 8 + length;
         let n = word(at).ok_or_else(damaged)? as usize;
-        let numbers = body.get(at + 8..).filter(|b| n.checked_mul(32) == Some(b.len())).ok_or_else(damaged)?;
+        let numbers =
+            body.get(at + 8..).filter(|b| n.checked_mul(32) == Some(b.len())).ok_or_else(damaged)?;
         let mut numbers = numbers.chunks_exact(8).map(|c| c.try_into().map_or(f64::NAN, f64::from_le_bytes));
         state.voidage = numbers.by_ref().take(n).collect();
         let rest: Vec<f64> = numbers.collect();
@@ -239,7 +249,12 @@ mod tests {
     use super::*;
 
     fn state() -> State {
-        let row = Row { step: 7, action_reaction_error: Some(1e-15), given: [1.0 / 3.0, 0.0, -2e-30], ..Row::default() };
+        let row = Row {
+            step: 7,
+            action_reaction_error: Some(1e-15),
+            given: [1.0 / 3.0, 0.0, -2e-30],
+            ..Row::default()
+        };
         State {
             exchange: 7,
             time: 0.1 + 0.2,
