@@ -15,6 +15,8 @@ pub struct Script {
     pub domain: Option<([f64; 3], [f64; 3])>,
     /// "p" or others, per axis
     pub boundary: Option<[String; 3]>,
+    /// particles of the data file
+    pub count: Option<f64>,
     pub has_fix: bool,
     pub has_run: bool,
     /// takes particles from a restart file
@@ -48,7 +50,9 @@ pub fn read(path: &Path, given: &BTreeMap<String, String>) -> Result<Script, Str
             }
             Some("create_box") => boxed = w.get(2).map(|r| (*r).into()),
             Some("read_data") => {
-                s.domain = w.get(1).and_then(|f| data_box(&path.parent().unwrap_or(Path::new(".")).join(f)));
+                let file = w.get(1).map(|f| path.parent().unwrap_or(Path::new(".")).join(f));
+                s.domain = file.as_ref().and_then(|f| data_box(f));
+                s.count = file.as_ref().and_then(|f| data_count(f));
             }
             Some("read_restart") => s.has_restart = true,
             Some("fix") if w.get(3) == Some(&"voidage") => s.has_fix = true,
@@ -78,6 +82,12 @@ fn commands(line: &str) -> Vec<&str> {
 
 fn substitute(line: &str, variables: &BTreeMap<String, String>) -> String {
     variables.iter().fold(line.to_string(), |l, (k, v)| l.replace(&format!("${{{k}}}"), v))
+}
+
+/// "N atoms" at the head of a data file.
+fn data_count(path: &Path) -> Option<f64> {
+    let text = std::fs::read_to_string(path).ok()?;
+    text.lines().take(40).find_map(|l| l.trim().strip_suffix("atoms")?.trim().parse().ok())
 }
 
 /// "lo hi xlo xhi" lines at the head of a data file.
