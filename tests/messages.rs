@@ -19,6 +19,9 @@ fn copy(from: &Path, to: &Path) {
 /// A change of a file: (file, old text, new text).
 type Edit<'a> = (&'a str, &'a str, &'a str);
 
+/// Case, edits, overrides, words of the message.
+type Message<'a> = (&'a str, &'a [Edit<'a>], &'a [&'a str], &'a [&'a str]);
+
 /// Checks a changed copy of a case; the exit code and what is printed.
 fn check(name: &str, case: &str, edits: &[Edit], set: &[&str]) -> (i32, String) {
     let to = std::env::temp_dir().join(format!("voidage-messages-{name}-{}", std::process::id()));
@@ -53,8 +56,7 @@ fn the_cases_are_without_errors() {
 
 #[test]
 fn errors() {
-    // case, edits, overrides, words of the message
-    let table: &[(&str, &[Edit], &[&str], &[&str])] = &[
+    let table: &[Message] = &[
         (
             SETTLING,
             &[("case.toml", "format = 1", "format = 2")],
@@ -168,7 +170,7 @@ fn errors() {
 fn warnings() {
     let smooth = "smooth.method=chebyshev";
     let no_slip = ("fluid/0/U", "frontAndBack { type slip; }", "frontAndBack { type noSlip; }");
-    let table: &[(&str, &[Edit], &[&str], &[&str])] = &[
+    let table: &[Message] = &[
         (
             SETTLING,
             &[],

@@ -191,3 +191,26 @@ fn sets_that_do_not_match_are_refused() {
     c.run(&["--restart=0.002"]);
     assert_eq!(c.rows().len(), 31);
 }
+
+#[test]
+fn a_killed_run_goes_on_from_its_newest_set() {
+    let (whole, broken) = (Case::new("settling", "whole", 0.05), Case::new("settling", "killed", 0.05));
+    for c in [&whole, &broken] {
+        c.entry("writeInterval", "0.005");
+    }
+    whole.run(&[]);
+    let mut c = Command::new(env!("CARGO_BIN_EXE_voidage"));
+    c.env("VOIDAGE_HOME", root().join("build")).arg("run").arg(&broken.0);
+    let mut child = c.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    while sets(&broken.0).is_empty() {
+        assert!(child.try_wait().unwrap().is_none(), "the run ended before its first set");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(sets(&broken.0).last().unwrap().0 < 0.049, "it was to be stopped on its way");
+    broken.run(&["--restart"]);
+    assert_eq!(whole.rows(), broken.rows(), "every exchange once, and the same");
+    assert_eq!(sets(&broken.0).len(), 2, "output.restarts sets are kept");
+}
