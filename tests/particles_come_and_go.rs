@@ -93,7 +93,7 @@ fn a_particle_that_changes_rank_keeps_its_ledger() {
     // where it is at the end: in the second rank
     assert!(on_ranks(&two.log).iter().any(|l| l.contains("1 max 0 min")), "{:?}", on_ranks(&two.log));
     // nothing shows that it crossed: a run on one rank gives the same rows to the last digit written
-    let one = run("stay", &moving, &script, 0.004, &["--set", "run.dem_ranks=1"]);
+    let one = run("stay", &moving, script, 0.004, &["--set", "run.dem_ranks=1"]);
     assert_eq!(one.rows.len(), two.rows.len());
     for (a, b) in one.rows.iter().zip(&two.rows) {
         for c in ["particles", "ledger_momentum", "given_x", "given_y", "given_z"] {
