@@ -11,6 +11,6 @@ newer=$(find "$here" "$abi" "$library" \( -name '*.cpp' -o -name '*.h' -o -name 
 [ -e "$out" ] && [ -z "$newer" ] && exit 0
 mkdir -p "$prefix/lib"
 OMPI_CXX=g++ mpicxx -std=c++11 -O2 -fPIC -Wall -Wextra -Wno-unused-parameter -isystem "$headers" -I"$abi" -shared \
-  -o "$out.part" "$here/fix_voidage.cpp" "$here/exchange.cpp" "$here/host.cpp" \
+  -o "$out.part" "$here/fix_voidage.cpp" "$here/exchange.cpp" "$here/restart.cpp" "$here/host.cpp" \
   "$library" -L"$prefix/lib" -lvoidage_client -ldl '-Wl,-rpath,$ORIGIN' -Wl,--no-undefined
 mv "$out.part" "$out"

@@ -45,11 +45,12 @@ void FixVoidage::open()
 
 void FixVoidage::exchange()
 {
-  send();
+  send(true);
   receive();
 }
 
-void FixVoidage::send()
+// settle: books the interval that ends here into the ledger.
+void FixVoidage::send(bool settle)
 {
   const uint64_t n = atom->nlocal;
   const voidage_block blocks[] = {
@@ -76,7 +77,7 @@ void FixVoidage::send()
     m[i] = atom->rmass[i];
     for (int k = 0; k < 3; k++) {
       // the fluid was given `charged` and the old ledger in full: what it still misses is taken - charged
-      a[LEDGER + k] = a[TAKEN + k] - a[CHARGED + k];
+      if (settle) a[LEDGER + k] = a[TAKEN + k] - a[CHARGED + k];
       x[3 * i + k] = atom->x[i][k];
       v[3 * i + k] = atom->v[i][k];
       w[3 * i + k] = atom->omega[i][k];
@@ -126,5 +127,10 @@ void FixVoidage::receive()
       totals_[6 + k] += a[LEDGER + k];
     }
   }
+  uint64_t length = 0, flags = 0;
+  const char *file = (const char *)voidage_read(link_, VOIDAGE_RESTART_FILE, &length);
+  restart_file_.assign(file ? file : "", file ? length : 0);
+  const double *flag = file ? (const double *)voidage_read(link_, VOIDAGE_FLAGS, &flags) : NULL;
+  last_ = flag && flags > 0 && flag[0] != 0.0;
   voidage_release(link_);
 }

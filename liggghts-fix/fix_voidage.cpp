@@ -27,7 +27,8 @@ using namespace FixConst;
 namespace LAMMPS_NS { namespace SignalHandler { extern bool request_quit; } }
 
 FixVoidage::FixVoidage(LAMMPS *lmp, int narg, char **arg)
-  : Fix(lmp, narg, arg), link_(NULL), a_(NULL), first_step_(-1), exchange_(0), interval_(1), explicit_limit_(0.2),
+  : Fix(lmp, narg, arg), link_(NULL), a_(NULL), first_step_(-1), exchange_(0), restored_(-1),
+    last_(false), interval_(1), explicit_limit_(0.2),
     constant_force_(false), ended_(false), quit_(false), integrated_(0), frozen_(0)
 {
   check_host();
@@ -39,18 +40,22 @@ FixVoidage::FixVoidage(LAMMPS *lmp, int narg, char **arg)
   for (int i = 0; i < 9; i++) totals_[i] = 0.0;
   nevery = 1;
   create_attribute = 1;
+  restart_global = 1;
+  restart_peratom = 1;
   vector_flag = 1;
   size_vector = 6;
   global_freq = 1;
   extvector = 1;
   grow_arrays(atom->nmax);
   atom->add_callback(0);
+  atom->add_callback(1);
   for (int i = 0; i < atom->nlocal; i++) set_arrays(i);
 }
 
 FixVoidage::~FixVoidage()
 {
   atom->delete_callback(id, 0);
+  atom->delete_callback(id, 1);
   memory->destroy(a_);
   voidage_close(link_);
 }
@@ -82,6 +87,13 @@ void FixVoidage::setup(int vflag)
   if (first_step_ < 0) {
     open();
     first_step_ = update->ntimestep;
+    if (setting("coupling.resumed") != 0.0) {
+      resume((bigint)setting("coupling.first_exchange"));
+      return;  // the forces are those of the restart file
+    }
+    // a file of an older coupled run is only a bed to start from
+    if (restored_ >= 0)
+      for (int i = 0; i < atom->nlocal; i++) set_arrays(i);
     exchange();
   }
   if (ended_) return;
@@ -146,6 +158,7 @@ void FixVoidage::end_of_step()
     fluid_force(i, 0.5 * update->dt, fd);
     for (int k = 0; k < 3; k++) f[i][k] += a_[i][FORCE + k] = fd[k];
   }
+  save();
 }
 
 void FixVoidage::post_run()

@@ -9,6 +9,7 @@
 
 #include "fix.h"
 #include "voidage.h"
+#include <string>
 #include <vector>
 
 namespace LAMMPS_NS {
@@ -32,15 +33,26 @@ class FixVoidage : public Fix {
   int pack_exchange(int, double *);
   int unpack_exchange(int, double *);
 
+  void write_restart(FILE *);
+  void restart(char *);
+  int pack_restart(int, double *);
+  void unpack_restart(int, int);
+  int size_restart(int);
+  int maxsize_restart();
+
  private:
   // columns of the per-atom table
   enum { K, U, F = U + 3, CHARGED = F + 3, TAKEN = CHARGED + 3, LEDGER = TAKEN + 3, FORCE = LEDGER + 3,
-         COLUMNS = FORCE + 3 };
+         HELD = FORCE + 3,  // force and torque of all kinds when a restart file is written
+         COLUMNS = HELD + 6 };
 
   voidage_link *link_;
   double **a_;                 // per atom, COLUMNS wide
   bigint first_step_;          // DEM step of exchange 0, -1: not yet
   bigint exchange_;            // number of the last exchange
+  bigint restored_;            // exchange a restart file brought back, -1: none
+  std::string restart_file_;   // to be written in this exchange, else empty
+  bool last_;                  // that is the last exchange of the run
   int interval_;               // DEM steps between exchanges
   double explicit_limit_;      // largest K dt / m handled explicitly
   bool constant_force_;        // force of the exchange held over the interval
@@ -54,8 +66,10 @@ class FixVoidage : public Fix {
   double setting(const char *);
   void open();
   void exchange();
-  void send();
+  void send(bool settle);
   void receive();
+  void resume(bigint first);
+  void save();
   void fluid_force(int i, double h, double *fd) const;
   void stop(const char *);
 };

@@ -28,6 +28,7 @@ Link::Link(const fvMesh& mesh)
 :
     link_(nullptr),
     mesh_(mesh),
+    first_(0),
     exchange_(-1),
     received_(-1)
 {
@@ -40,6 +41,8 @@ Link::Link(const fvMesh& mesh)
     );
     if (!link_) fail();
 
+    first_ = label(setting("coupling.first_exchange"));
+    exchange_ = received_ = first_ - 1;
     const scalar wanted = setting("fluid.time_step");
     if (mag(dt - wanted) > 1e-9*wanted)
     {

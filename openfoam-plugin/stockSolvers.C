@@ -55,7 +55,7 @@ static void sendState(const fvMesh& mesh, bool stepDone)
 static voidage::Link& started(const fvMesh& mesh)
 {
     voidage::Link& link = voidage::Link::New(mesh);
-    if (link.exchange() < 0)
+    if (link.exchange() < link.first())
     {
         if (link.setting("fluid.model") == 1 || link.on("send.stress_divergence"))
         {
@@ -87,7 +87,8 @@ public:
     virtual bool execute()
     {
         voidage::Link& link = started(mesh_);
-        if (time_.timeIndex() > time_.startTimeIndex() && link.exchange() < time_.timeIndex() - time_.startTimeIndex())
+        const label done = time_.timeIndex() - time_.startTimeIndex();
+        if (done > 0 && link.exchange() - link.first() < done)
         {
             sendState(mesh_, true);
         }

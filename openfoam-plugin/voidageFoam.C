@@ -16,12 +16,14 @@
 #include "turbulentTransportModel.H"
 #include "link.H"
 #include "sources.H"
+#include "clock.H"
 
 int main(int argc, char *argv[])
 {
     argList::addNote("volume-averaged incompressible flow, coupled to particles; started by `voidage run CASE`");
+    argList::addOption("restartTime", "time", "continue from this write time (voidage run --restart)");
     #include "setRootCase.H"
-    #include "createTime.H"
+    voidage::Clock runTime(args);
     #include "createMesh.H"
     pimpleControl pimple(mesh);
     #include "createFields.H"

@@ -4,9 +4,10 @@
 //! Reads sums in SI units; does not know where they come from.
 
 use crate::sums::norm;
+use serde::{Deserialize, Serialize};
 
 /// The action-reaction books of one exchange, N s.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Books {
     /// Σ impulse charged, from the coupler
     pub charged: [f64; 3],

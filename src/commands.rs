@@ -6,6 +6,7 @@ use crate::config::{self, CaseFile, Config, Problem, Severity};
 use crate::couple::{Exchange, receive_mesh};
 use crate::launch::{self, Outcome};
 use crate::monitor::{self, Monitor};
+use crate::output::restart::{Sets, State};
 use crate::partners::Partners;
 use crate::setup;
 use crate::step::CouplingStep;
@@ -63,12 +64,27 @@ pub fn check(case: &Path, set: &[String]) -> u8 {
 }
 
 /// `voidage run CASE`
-pub fn run(case: &Path, into: Option<&Path>, set: &[String]) -> u8 {
+pub fn run(case: &Path, into: Option<&Path>, set: &[String], restart: Option<Option<f64>>) -> u8 {
+    if into.is_some() && restart.is_some() {
+        let fix = "leave --into out";
+        print(&[Problem::error("--restart", "--into", "a restart goes on in the folder of the run", fix)]);
+        return BAD_INPUT;
+    }
     // problems of the original are told before anything is copied
-    let config = match read(case, set) {
+    let mut config = match read(case, set) {
         Ok(c) => c,
         Err(code) => return code,
     };
+    let restart = match restart.map(|time| launch::restart::find(&config, time)).transpose() {
+        Ok(r) => r,
+        Err(p) => {
+            print(&p);
+            return BAD_INPUT;
+        }
+    };
+    if let Some(r) = &restart {
+        config.control.start = r.state.origin;
+    }
     let problems = config::check(&config);
     print(&problems);
     if problems.iter().any(|p| p.severity == Severity::Error) {
@@ -95,7 +111,7 @@ pub fn run(case: &Path, into: Option<&Path>, set: &[String]) -> u8 {
         }
     }
     let begin = Instant::now();
-    match launch::run(&config, &stop) {
+    match launch::run(&config, restart.as_ref(), &stop) {
         Ok(Outcome::Complete) => {
             println!(
                 "complete in {:.1} s; results in {}",
@@ -120,8 +136,8 @@ pub fn run(case: &Path, into: Option<&Path>, set: &[String]) -> u8 {
 }
 
 /// `voidage couple CASE`; its standard output is read by `voidage run`.
-pub fn couple(case: &Path, resolved: bool) -> u8 {
-    match coupled(case, resolved) {
+pub fn couple(case: &Path, resolved: bool, restart: Option<&Path>) -> u8 {
+    match coupled(case, resolved, restart) {
         Ok(()) => OK,
         Err(e) => {
             println!("@error {}", e.replace('\n', "\t"));
@@ -130,7 +146,7 @@ pub fn couple(case: &Path, resolved: bool) -> u8 {
     }
 }
 
-fn coupled(case: &Path, resolved: bool) -> Result<(), String> {
+fn coupled(case: &Path, resolved: bool, restart: Option<&Path>) -> Result<(), String> {
     let _world = crate::comm::World::join()?;
     let session = Session::from_environment()?;
     let mut config =
@@ -140,13 +156,17 @@ fn coupled(case: &Path, resolved: bool) -> Result<(), String> {
             std::fs::read_to_string(case.join("logs/case.resolved.toml")).map_err(|e| e.to_string())?;
         config.file = toml::from_str::<CaseFile>(&text).map_err(|e| e.to_string())?;
     }
+    let resume = restart.map(State::read).transpose()?;
+    if let Some(s) = &resume {
+        config.control.start = s.origin;
+    }
     let hub = Hub::join(&session).map_err(|e| e.to_string())?;
     let serve = |role, ranks| (0..ranks).map(|r| hub.serve(role, r)).collect::<Result<Vec<_>, _>>();
     let dem = serve(Role::Dem, session.dem_ranks).map_err(|e| e.to_string())?;
     let cfd = serve(Role::Cfd, session.cfd_ranks).map_err(|e| e.to_string())?;
     session.announce().map_err(|e| e.to_string())?;
     let mut partners = Partners::new(dem, cfd, Duration::from_secs_f64(session.wait));
-    let result = exchange(&config, &session, &mut partners);
+    let result = exchange(&config, &session, &mut partners, resume);
     if let Err(e) = &result {
         partners.stop(e);
         // last words must be read before the segments go
@@ -159,12 +179,13 @@ fn exchange(
     config: &Config,
     session: &Session,
     partners: &mut Partners<voidage_shm::Channel>,
+    resume: Option<State>,
 ) -> Result<(), String> {
     let start_limit = Duration::from_secs_f64(session.start);
     partners.belongs_to(session.launcher);
     partners.meet(&session.token, start_limit).map_err(|e| e.to_string())?;
-    setup::agree(config, partners)?;
-    let welcome = setup::welcome(config);
+    setup::agree(config, partners, resume.as_ref())?;
+    let welcome = setup::welcome(config, resume.as_ref());
     for i in partners.dem().chain(partners.cfd()) {
         partners.welcome(i, &welcome).map_err(|e| e.to_string())?;
     }
@@ -173,7 +194,15 @@ fn exchange(
     let [smoother, positive] = setup::smoothers(config, &mesh)?;
     println!("smoothing: {}, {} sweeps", smoother.name(), smoother.degree());
     let step = CouplingStep::new(mesh, setup::setup(config)?, setup::mapping(config)?, smoother, positive);
-    let monitor = Monitor::create(&config.folder.join("monitor.csv"), false).map_err(|e| e.to_string())?;
+    let file = config.folder.join("monitor.csv");
+    let monitor = match &resume {
+        None => Monitor::create(&file, false),
+        Some(s) => Monitor::resume(&file, s.exchange),
+    };
+    let monitor = monitor.map_err(|e| format!("{}: {e}", file.display()))?;
+    let interval = i64::from(config.file.coupling.interval);
+    let step_now = partners.hello(0).map_or(0, |h| h.step);
+    let dem_step = step_now - resume.as_ref().map_or(0, |s| s.exchange * interval);
     let steps = config.steps();
     let mut said: Option<Instant> = None;
     let mut progress = |row: &monitor::Row, s: &crate::couple::Summary| {
@@ -191,7 +220,8 @@ fn exchange(
             );
         }
     };
-    let mut output = crate::output::Output::new(config).map_err(|e| format!("CASE/voidage: {e}"))?;
+    let mut output = crate::output::Output::new(config, resume.as_ref().map(|s| s.time))
+        .map_err(|e| format!("CASE/voidage: {e}"))?;
     let mut write = |s: &crate::couple::Snapshot| output.write(s);
     let mut run = Exchange {
         partners: Partners::new(Vec::new(), Vec::new(), Duration::ZERO),
@@ -199,6 +229,10 @@ fn exchange(
         two_way: config.file.coupling.feedback == config::Feedback::TwoWay,
         period: config.period(),
         start: config.control.start,
+        dem_step,
+        interval,
+        resume,
+        sets: Sets::new(config),
         monitor,
         progress: &mut progress,
         write: &mut write,

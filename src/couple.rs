@@ -8,10 +8,13 @@
 use crate::balance::Books;
 use crate::mesh::{self, Mesh, MeshPiece};
 use crate::monitor::{Monitor, Row};
+use crate::output::restart::{self, Sets, State};
 use crate::particles::{ParticleError, Particles};
 use crate::partners::{PartnerError, Partners};
 use crate::step::{CouplingStep, Fluid, StepError};
 use crate::sums::norm;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
 use std::time::{Duration, Instant};
 use thiserror::Error;
 use voidage_wire::{Block, Frame, Transport, WireError, field, frame, kind};
@@ -59,7 +62,7 @@ pub enum CoupleError {
 }
 
 /// What a run came to.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs)]
 pub struct Summary {
     pub steps: i64,
@@ -110,6 +113,14 @@ pub struct Exchange<'a, T: Transport> {
     pub period: f64,
     /// Fluid time at exchange 0, s.
     pub start: f64,
+    /// Step number of the DEM at exchange 0, and its steps between exchanges.
+    pub dem_step: i64,
+    /// see `dem_step`
+    pub interval: i64,
+    /// Continues after this exchange.
+    pub resume: Option<State>,
+    /// Writes restart sets at the fluid's write times.
+    pub sets: Option<Sets>,
     /// monitor.csv
     pub monitor: Monitor,
     /// Told after each exchange.
@@ -139,7 +150,13 @@ impl<T: Transport> Exchange<'_, T> {
         let mut fluid = Fluid::default();
         let mut open: Option<Open> = None;
         let mut left = [0.0; 3];
-        for k in 0.. {
+        let mut from = 0;
+        if let Some(s) = self.resume.take() {
+            from = s.exchange + 1;
+            (left, summary) = (s.left, s.summary);
+            open = Some(self.take_up(&s)?);
+        }
+        for k in from.. {
             let begin = Instant::now();
             let time = self.start + k as f64 * self.period;
             let (first, mut wait_cfd, mut last, mut write) = (k == 0, Duration::ZERO, false, true);
@@ -161,10 +178,18 @@ impl<T: Transport> Exchange<'_, T> {
             }
             self.step.after_fluid(&particles, &fluid, first).map_err(stage)?;
             self.step.books.reaction = reaction;
+            let file = |source| CoupleError::File { what: "restart set", source };
+            let set = match &self.sets {
+                Some(sets) if write && !first => Some(sets.begin(time).map_err(file)?),
+                _ => None,
+            };
             if last {
+                self.partners.release_cfd();
+            }
+            if last && set.is_none() {
                 self.partners.stop("");
             } else {
-                self.send_drive(k, time, &particles)?;
+                self.send_drive(k, time, &particles, set.as_deref(), last)?;
             }
             if write {
                 let snapshot = Snapshot { k, time, particles: &particles, step: &self.step, fluid: &fluid };
@@ -180,6 +205,16 @@ impl<T: Transport> Exchange<'_, T> {
             summary.wait_cfd += o.row.wait_cfd;
             summary.steps = k;
             summary.time = time;
+            if let Some(set) = set {
+                for i in self.partners.dem() {
+                    self.partners.receive(i, kind::WRITTEN, "word that its restart file is written")?;
+                }
+                if last {
+                    self.partners.stop("");
+                }
+                let state = self.state(k, &particles, &fluid, &o, left, &summary);
+                self.sets.iter().try_for_each(|s| s.finish(&set, state.clone())).map_err(file)?;
+            }
             (self.progress)(&o.row, &summary);
             if last {
                 self.close(o, None, &mut left, &mut summary)?;
@@ -188,6 +223,75 @@ impl<T: Transport> Exchange<'_, T> {
             open = Some(o);
         }
         Ok(summary)
+    }
+
+    /// The set of exchange k, as far as the exchanges know it.
+    fn state(
+        &self,
+        k: i64,
+        p: &Particles,
+        fluid: &Fluid,
+        open: &Open,
+        left: [f64; 3],
+        summary: &Summary,
+    ) -> State {
+        let mesh = &self.step.mesh;
+        State {
+            exchange: k,
+            time: self.start + k as f64 * self.period,
+            origin: self.start,
+            dem_step: self.dem_step + k * self.interval,
+            particles: p.len(),
+            particles_sum: restart::particles_sum(p),
+            cells: mesh.ids.len(),
+            mesh_sum: restart::mesh_sum(&mesh.ids, &mesh.volume),
+            left,
+            summary: *summary,
+            row: open.row,
+            books: open.books,
+            voidage: self.step.sources.voidage.clone(),
+            velocity: fluid.velocity.clone(),
+            ..State::default()
+        }
+    }
+
+    /// Takes up a run after exchange `s.exchange`: both programs stand where the set says, or the run ends here.
+    fn take_up(&mut self, s: &State) -> Result<Open, CoupleError> {
+        let (k, mut fluid, mut waited) = (s.exchange, Fluid::default(), Duration::ZERO);
+        let refuse = |what: String| {
+            CoupleError::OutOfStep(format!(
+                "restart set of t = {}: {what}; name another set (--restart=TIME) or start anew",
+                s.time
+            ))
+        };
+        self.receive_fluid(k, &mut fluid, &mut waited)?;
+        let mesh = &self.step.mesh;
+        if s.cells != mesh.ids.len() || s.mesh_sum != restart::mesh_sum(&mesh.ids, &mesh.volume) {
+            return Err(refuse(format!(
+                "it belongs to another mesh ({} cells, now {})",
+                s.cells,
+                mesh.ids.len()
+            )));
+        }
+        let size = s.velocity.iter().map(|v| norm(*v)).fold(0.0, f64::max);
+        let gap = s.velocity.iter().zip(&fluid.velocity).map(|(a, b)| norm([0, 1, 2].map(|c| a[c] - b[c])));
+        let gap = gap.fold(0.0, f64::max);
+        // the fluid's files may be text: six digits are the least OpenFOAM writes by default
+        if gap > 1e-4 * size {
+            return Err(refuse(format!(
+                "the fluid's fields are not those it was written with (U differs by {gap:e} m/s)"
+            )));
+        }
+        let p = self.receive_particles(k)?;
+        if p.len() != s.particles || restart::particles_sum(&p) != s.particles_sum {
+            let (was, now) = (s.particles, p.len());
+            return Err(refuse(format!(
+                "the DEM brought other particles back ({was} were saved, {now} came, or their values changed after read_restart)"
+            )));
+        }
+        self.step.restore(&s.voidage, &s.velocity);
+        self.send_sources(k, s.time)?;
+        Ok(Open { row: s.row, books: s.books })
     }
 
     fn in_step(got: i64, due: i64, who: &str) -> Result<(), CoupleError> {
@@ -278,7 +382,16 @@ impl<T: Transport> Exchange<'_, T> {
         Ok(())
     }
 
-    fn send_drive(&mut self, k: i64, time: f64, particles: &Particles) -> Result<(), CoupleError> {
+    /// `set`: folder of the restart set the DEM is to write its file to.
+    fn send_drive(
+        &mut self,
+        k: i64,
+        time: f64,
+        particles: &Particles,
+        set: Option<&Path>,
+        last: bool,
+    ) -> Result<(), CoupleError> {
+        let file = set.map(|s| s.join(restart::PARTICLES).display().to_string());
         let mut counts = vec![0; self.partners.dem().len()];
         particles.origin.iter().for_each(|o| counts[o.0 as usize] += 1);
         let drive = &self.step.drive;
@@ -291,10 +404,23 @@ impl<T: Transport> Exchange<'_, T> {
             ];
             let mut blocks = vec![Block::f64s(field::DRAG_COEFFICIENT, n)];
             blocks.extend(vectors.iter().map(|f| Block::f64s(f.0, 3 * n)));
+            if let Some(name) = &file {
+                blocks.extend([Block::bytes(field::RESTART_FILE, name.len()), Block::f64s(field::FLAGS, 1)]);
+            }
             let own = || particles.origin.iter().enumerate().filter(|(_, o)| o.0 as usize == i);
             self.partners.send(i, kind::DRIVE, k, time, &blocks, |words| {
                 if let Some(to) = frame::f64s_mut(words, field::DRAG_COEFFICIENT) {
                     own().for_each(|(p, o)| to[o.1 as usize] = drive.drag_coefficient[p]);
+                }
+                if let (Some(name), Some(to)) = (&file, frame::array_mut(words, field::RESTART_FILE)) {
+                    for (word, bytes) in to.iter_mut().zip(name.as_bytes().chunks(8)) {
+                        let mut all = [0; 8];
+                        all[..bytes.len()].copy_from_slice(bytes);
+                        *word = u64::from_ne_bytes(all);
+                    }
+                }
+                if let Some(to) = frame::f64s_mut(words, field::FLAGS) {
+                    to[0] = f64::from(u8::from(last));
                 }
                 for (name, from) in vectors {
                     let Some(to) = frame::f64s_mut(words, name) else { continue };

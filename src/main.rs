@@ -30,6 +30,9 @@ enum Command {
         /// override a key: section.key=value (repeatable)
         #[arg(long = "set", value_name = "KEY=VALUE")]
         set: Vec<String>,
+        /// continue from the newest restart set of the case, or from that of a write time: --restart=0.25
+        #[arg(long, value_name = "TIME", num_args = 0..=1, require_equals = true)]
+        restart: Option<Option<f64>>,
     },
     /// Validates a case without running it and prints all problems at once
     Check {
@@ -46,6 +49,9 @@ enum Command {
         /// read the case as `voidage run` resolved it (logs/case.resolved.toml)
         #[arg(long)]
         resolved: bool,
+        /// folder of the restart set to continue from
+        #[arg(long)]
+        restart: Option<PathBuf>,
     },
     /// Prints the reference of case.toml, or of monitor.csv
     Explain {
@@ -66,9 +72,9 @@ fn main() -> ExitCode {
     };
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
     let code = match arguments.command {
-        Command::Run { case, into, set } => commands::run(&case, into.as_deref(), &set),
+        Command::Run { case, into, set, restart } => commands::run(&case, into.as_deref(), &set, restart),
         Command::Check { case, set } => commands::check(&case, &set),
-        Command::Couple { case, resolved } => commands::couple(&case, resolved),
+        Command::Couple { case, resolved, restart } => commands::couple(&case, resolved, restart.as_deref()),
         Command::Explain { topic } => commands::explain(&topic),
         Command::Version => commands::version(),
     };

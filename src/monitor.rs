@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `monitor.csv`: one row per exchange, every column defined in `COLUMNS`. Does not know how rows arise.
 
+use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -37,7 +38,7 @@ pub const COLUMNS: &[(&str, &str, &str)] = &[
 ];
 
 /// One row; order of `COLUMNS`.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs)]
 pub struct Row {
     pub step: i64,
@@ -64,6 +65,20 @@ pub struct Monitor {
 }
 
 impl Monitor {
+    /// Goes on with the file after a restart: rows from exchange `step` on are dropped, the run writes them anew.
+    pub fn resume(path: &Path, step: i64) -> std::io::Result<Self> {
+        let text = std::fs::read_to_string(path).unwrap_or_default();
+        let earlier =
+            |l: &&str| l.split(',').next().and_then(|n| n.parse::<i64>().ok()).is_none_or(|n| n < step);
+        let kept: Vec<&str> = text.lines().filter(earlier).collect();
+        if kept.is_empty() {
+            return Self::create(path, false);
+        }
+        let part = path.with_extension("part");
+        std::fs::write(&part, kept.join("\n") + "\n")?;
+        std::fs::rename(&part, path)?;
+        Self::create(path, true)
+    }
     /// Starts the file, or goes on with it after a restart (`append`).
     pub fn create(path: &Path, append: bool) -> std::io::Result<Self> {
         let exists = path.exists();

@@ -88,6 +88,8 @@ pub struct Partner<T: Transport> {
     role: Role,
     rank: u32,
     hello: Option<Hello>,
+    /// has said its last: may end
+    free: bool,
     pending: Option<T::Sample>,
 }
 
@@ -110,6 +112,7 @@ impl<T: Transport> Partners<T> {
                 role,
                 rank: rank as u32,
                 hello: None,
+                free: false,
                 pending: None,
             }
         };
@@ -203,6 +206,7 @@ impl<T: Transport> Partners<T> {
         }
         for j in 0..self.list.len() {
             if let Some(h) = &self.list[j].hello
+                && !self.list[j].free
                 && !h.process.is_alive()
                 && self.list[j].pending.is_none()
             {
@@ -271,6 +275,13 @@ impl<T: Transport> Partners<T> {
             transport.send(loan)
         };
         work().map_err(|source| PartnerError::Transport { who, source })
+    }
+
+    /// The fluid has sent its last: its ranks may end, nobody waits for them.
+    pub fn release_cfd(&mut self) {
+        for i in self.cfd() {
+            self.list[i].free = true;
+        }
     }
 
     /// Tells everyone that the run ends; empty reason: it is complete. Best effort.

@@ -5,6 +5,7 @@ use crate::config::{Config, Feedback, Flow, GravityTreatment, InInterval, Model}
 use crate::interpolate::FluidVelocity;
 use crate::map::Mapping;
 use crate::mesh::Mesh;
+use crate::output::restart::State;
 use crate::partners::Partners;
 use crate::smooth::{self, Diffusion, Smoother};
 use crate::step::Setup;
@@ -54,7 +55,7 @@ pub fn smoothers(c: &Config, mesh: &Mesh) -> Result<[Box<dyn Smoother>; 2], Stri
 }
 
 /// What the partners are told (names in `docs/wire.md`).
-pub fn welcome(c: &Config) -> Welcome {
+pub fn welcome(c: &Config, resume: Option<&State>) -> Welcome {
     let f = &c.file;
     let yes = f64::from;
     let mut w = Welcome::default();
@@ -62,6 +63,8 @@ pub fn welcome(c: &Config) -> Welcome {
     set("dem.time_step", f.dem.time_step);
     set("dem.explicit_limit", 0.2);
     set("dem.constant_force", yes(f.dem.force == InInterval::Constant));
+    set("coupling.resumed", yes(resume.is_some()));
+    set("coupling.first_exchange", resume.map_or(0.0, |s| s.exchange as f64));
     set("coupling.interval", f64::from(f.coupling.interval));
     set("fluid.density", f.fluid.density);
     set("fluid.kinematic_viscosity", f.fluid.kinematic_viscosity);
@@ -83,7 +86,7 @@ pub fn welcome(c: &Config) -> Welcome {
 }
 
 /// The programs must agree on time steps; each says its own in its hello.
-pub fn agree<T: Transport>(c: &Config, partners: &Partners<T>) -> Result<(), String> {
+pub fn agree<T: Transport>(c: &Config, partners: &Partners<T>, resume: Option<&State>) -> Result<(), String> {
     for i in partners.dem().chain(partners.cfd()) {
         let Some(h) = partners.hello(i) else { continue };
         let dem = partners.dem().contains(&i);
@@ -96,6 +99,21 @@ pub fn agree<T: Transport>(c: &Config, partners: &Partners<T>) -> Result<(), Str
             return Err(format!(
                 "{} runs with a time step of {:e} s, {key} is {wanted:e} s: make them equal",
                 h.program, h.time_step
+            ));
+        }
+        let Some(s) = resume else { continue };
+        if dem && h.step != s.dem_step {
+            return Err(format!(
+                "{} starts at step {}, the restart set is of step {}: the script must read ${{voidage_restart_file}} \
+                 and neither run steps nor reset_timestep before the coupled run",
+                h.program, h.step, s.dem_step
+            ));
+        }
+        if !dem && (h.time - s.time).abs() > 0.01 * c.period() {
+            return Err(format!(
+                "{} starts at t = {} s, the restart set is of t = {} s: a stock solver needs, in controlDict, \
+                 startFrom latestTime; and the newest set",
+                h.program, h.time, s.time
             ));
         }
     }

@@ -252,9 +252,10 @@ impl CouplingStep {
         }
     }
 
-    /// Puts the voidage at the start of the coming step (restart).
-    pub fn restore_voidage(&mut self, voidage: &[f64]) {
+    /// Puts the voidage and the fluid velocity at the start of the coming step (restart).
+    pub fn restore(&mut self, voidage: &[f64], fluid_velocity: &[[f64; 3]]) {
         self.sources.voidage.copy_from_slice(voidage);
+        self.fluid_velocity.copy_from_slice(fluid_velocity);
         self.filled = (0..self.mesh.len() as u32).collect();
     }
 

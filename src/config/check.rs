@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! What cannot work, or will surprise: checked across case.toml, the OpenFOAM case and the DEM script.
 
+use super::resolution::{courant, gather_bias, relaxation};
 use super::{Config, Feedback, GravityTreatment, InInterval, Model, Problem, foam, script};
 
 /// All problems of a case, errors first.
@@ -124,6 +125,22 @@ fn models(c: &Config, p: &mut Vec<Problem>) {
             "gravity_treatment = \"archimedes\"",
         ));
     }
+    let weight = f.fluid.gravity.map(|g| f.fluid.density * g);
+    let square = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>();
+    let gap = [0, 1, 2].map(|a| f.fluid.mean_pressure_gradient[a] - weight[a]);
+    if f.fluid.gravity_treatment == GravityTreatment::Archimedes
+        && moving
+        && square(gap) < 1e-4 * square(weight)
+    {
+        let accepted = "this is the hydrostatic gradient rho g: with the Archimedes force the fluid's weight would act twice";
+        let fix = "gravity_treatment = \"none\", or a mean gradient without rho g";
+        p.push(Problem::error(
+            "fluid.mean_pressure_gradient",
+            format!("{:?}", f.fluid.mean_pressure_gradient),
+            accepted,
+            fix,
+        ));
+    }
     if f.dem.force == InInterval::Constant {
         let accepted = "a constant force over the interval errs by K Δt/(2 m)";
         p.push(Problem::warning(
@@ -209,29 +226,8 @@ fn dem(c: &Config, s: &script::Script, p: &mut Vec<Problem>) {
             ));
         }
         if let Some(rho) = s.density {
-            relaxation(c, r, rho, p);
+            relaxation(c, r, rho, s.count, p);
         }
-    }
-}
-
-/// Time steps against the particle's relaxation time (R eq. 9).
-fn relaxation(c: &Config, radius: f64, density: f64, p: &mut Vec<Problem>) {
-    let mu = c.file.fluid.density * c.file.fluid.kinematic_viscosity;
-    let tau = density * (2.0 * radius).powi(2) / (18.0 * mu);
-    let x = c.period() / tau;
-    if c.file.coupling.scheme == "explicit" && x > 1.0 {
-        let accepted =
-            format!("the fluid step is {x:.2} relaxation times (R eq. 9): explicit coupling is unstable");
-        p.push(Problem::error(
-            "coupling.scheme",
-            "explicit",
-            &accepted,
-            "coupling.scheme = \"conservative\"",
-        ));
-    }
-    if c.file.dem.force == InInterval::Constant && x > 0.01 {
-        let accepted = format!("the constant force errs by {:.1} % of the drag (limit 0.5 %)", 50.0 * x);
-        p.push(Problem::error("dem.force", "constant", &accepted, "dem.force = \"implicit\""));
     }
 }
 
@@ -248,6 +244,17 @@ fn meshes(c: &Config, mesh: &foam::Extent, s: &script::Script, p: &mut Vec<Probl
             &accepted,
             "smooth.method = \"none\", or a larger bandwidth",
         ));
+    }
+    courant(c, size, p);
+    gather_bias(c, mesh, s, p);
+    if let (Some(h), Some(r)) = (size, s.radius.filter(|_| c.file.smooth.method == "none"))
+        && h < 6.0 * r
+    {
+        let accepted = format!(
+            "the cells ({h:.3e} m) are smaller than three particle diameters: the voidage of a cell jumps"
+        );
+        let fix = format!("smooth.method = \"chebyshev\" and smooth.bandwidth = {:e}", 8.0 * r);
+        p.push(Problem::warning("smooth.method", "none", &accepted, fix));
     }
     let Some((lower, upper)) = s.domain else { return };
     for a in 0..3 {

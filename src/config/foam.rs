@@ -77,6 +77,15 @@ pub fn viscosity(case: &Path) -> Option<f64> {
     number(&std::fs::read_to_string(case.join("constant/transportProperties")).ok()?, "nu")
 }
 
+/// What 0/U says: the fastest uniform velocity (m/s), and whether there are walls the fluid sticks to.
+pub fn start(case: &Path) -> Option<(f64, bool)> {
+    let text = plain(&std::fs::read_to_string(case.join("0/U")).ok()?);
+    let speed = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let fastest = vectors(&text).iter().map(speed).fold(0.0, f64::max);
+    // with slip walls too, which of them stand opposite each other is not known here
+    Some((fastest, text.contains("noSlip") && !text.contains("type slip")))
+}
+
 /// Box of the mesh, from blockMeshDict or ascii polyMesh points.
 pub fn extent(case: &Path) -> Option<Extent> {
     from_block_mesh(case).or_else(|| {
@@ -116,8 +125,9 @@ fn from_block_mesh(case: &Path) -> Option<Extent> {
         let end = text[at..].find(';')?;
         Some(&text[at..at + end])
     };
-    let triples = vectors(section("blocks")?);
-    let cells = triples.iter().filter(|v| v.iter().all(|x| *x >= 1.0 && x.fract() == 0.0));
+    // the first triple of each block; the next one is its grading
+    let triples = section("blocks")?.split("hex").skip(1).filter_map(|b| vectors(b).first().copied());
+    let cells = triples.filter(|v| v.iter().all(|x| *x >= 1.0 && x.fract() == 0.0));
     let cells: f64 = cells.map(|v| v.iter().product::<f64>()).sum();
     bounds(&vectors(section("vertices")?), scale, (cells > 0.0).then_some(cells as usize))
 }

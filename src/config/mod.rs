@@ -7,6 +7,7 @@
 mod check;
 pub mod foam;
 mod raw;
+mod resolution;
 pub mod script;
 
 pub use check::check;

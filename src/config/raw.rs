@@ -249,10 +249,11 @@ pub struct Output {
     pub fields: bool,
     pub particles: bool,
     pub picture: String,
+    pub restarts: u32,
 }
 impl Default for Output {
     fn default() -> Self {
-        Self { fields: true, particles: true, picture: "none".into() }
+        Self { fields: true, particles: true, picture: "none".into(), restarts: 2 }
     }
 }
 
@@ -325,6 +326,12 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("output.fields", "", "true", "cell fields for ParaView at the fluid's write times"),
     ("output.particles", "", "true", "particles for ParaView at the fluid's write times"),
     ("output.picture", "", "none", "none | x | y | z: animation of the particles seen along that axis"),
+    (
+        "output.restarts",
+        "",
+        "2",
+        "restart sets kept, written at the fluid's write times (voidage run --restart); 0: none",
+    ),
     ("limits.wait", "s", "60", "longest wait for a peer"),
     ("limits.outside", "", "error", "error | exclude: particles outside the mesh"),
     ("limits.voidage_min", "", "0", "cap the voidage from below (counted); 0: stop the run instead"),

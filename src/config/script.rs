@@ -15,8 +15,12 @@ pub struct Script {
     pub domain: Option<([f64; 3], [f64; 3])>,
     /// "p" or others, per axis
     pub boundary: Option<[String; 3]>,
+    /// particles of the data file
+    pub count: Option<f64>,
     pub has_fix: bool,
     pub has_run: bool,
+    /// takes particles from a restart file
+    pub has_restart: bool,
     pub radius: Option<f64>,
     pub density: Option<f64>,
 }
@@ -26,7 +30,8 @@ pub fn read(path: &Path, given: &BTreeMap<String, String>) -> Result<Script, Str
     let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
     let mut variables = given.clone();
     let (mut s, mut regions, mut boxed) = (Script::default(), BTreeMap::new(), None::<String>);
-    for line in text.replace("&\n", " ").lines() {
+    let text = text.replace("&\n", " ");
+    for line in text.lines().flat_map(commands) {
         let line = substitute(line.split('#').next().unwrap_or(""), &variables);
         let w: Vec<&str> = line.split_whitespace().collect();
         let n = |i: usize| w.get(i).and_then(|x| x.parse::<f64>().ok());
@@ -45,8 +50,11 @@ pub fn read(path: &Path, given: &BTreeMap<String, String>) -> Result<Script, Str
             }
             Some("create_box") => boxed = w.get(2).map(|r| (*r).into()),
             Some("read_data") => {
-                s.domain = w.get(1).and_then(|f| data_box(&path.parent().unwrap_or(Path::new(".")).join(f)));
+                let file = w.get(1).map(|f| path.parent().unwrap_or(Path::new(".")).join(f));
+                s.domain = file.as_ref().and_then(|f| data_box(f));
+                s.count = file.as_ref().and_then(|f| data_count(f));
             }
+            Some("read_restart") => s.has_restart = true,
             Some("fix") if w.get(3) == Some(&"voidage") => s.has_fix = true,
             Some("run" | "rerun") => s.has_run = true,
             Some("set") if line.contains("density") || line.contains("diameter") => {
@@ -63,8 +71,23 @@ pub fn read(path: &Path, given: &BTreeMap<String, String>) -> Result<Script, Str
     Ok(s)
 }
 
+/// A line, or the commands in quotes of an `if` line.
+fn commands(line: &str) -> Vec<&str> {
+    if line.split_whitespace().next() == Some("if") {
+        // 1: the condition; then one in each odd part
+        return line.split('"').skip(3).step_by(2).collect();
+    }
+    vec![line]
+}
+
 fn substitute(line: &str, variables: &BTreeMap<String, String>) -> String {
     variables.iter().fold(line.to_string(), |l, (k, v)| l.replace(&format!("${{{k}}}"), v))
+}
+
+/// "N atoms" at the head of a data file.
+fn data_count(path: &Path) -> Option<f64> {
+    let text = std::fs::read_to_string(path).ok()?;
+    text.lines().take(40).find_map(|l| l.trim().strip_suffix("atoms")?.trim().parse().ok())
 }
 
 /// "lo hi xlo xhi" lines at the head of a data file.

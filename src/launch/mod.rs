@@ -4,10 +4,12 @@
 
 pub mod groups;
 pub mod prepare;
+pub mod restart;
 mod ui;
 
 use crate::config::Config;
 use groups::{Group, Groups};
+use restart::Restart;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -76,21 +78,32 @@ fn mpirun(ranks: u32, shared: &Path, export: &[&str]) -> Vec<String> {
 }
 
 /// Runs a case to its end. `stop` is set by Ctrl-C.
-pub fn run(config: &Config, stop: &AtomicBool) -> Result<Outcome, String> {
+pub fn run(config: &Config, from: Option<&Restart>, stop: &AtomicBool) -> Result<Outcome, String> {
     let home = companions()?;
     let logs = config.folder.join("logs");
+    if let Some(r) = from.filter(|_| logs.exists()) {
+        // the logs of the part before stay
+        let old = config.folder.join(format!("logs-until-{}", r.state.time));
+        if !old.exists() {
+            std::fs::rename(&logs, &old).map_err(|e| format!("{}: {e}", old.display()))?;
+        }
+    }
     std::fs::create_dir_all(&logs).map_err(|e| format!("{}: {e}", logs.display()))?;
+    restart::forget(&config.folder, from.map(|r| r.state.time))
+        .map_err(|e| format!("old restart sets: {e}"))?;
     let _ = std::fs::remove_file(logs.join("liggghts.log")); // an old one must not explain a new failure
     for token in voidage_shm::janitor::clean_dead().map_err(|e| e.to_string())? {
         tracing::info!("removed what the dead run {token} left behind");
     }
-    prepare::fluid(config, &logs)?;
+    if from.is_none() {
+        prepare::fluid(config, &logs)?;
+    }
     let f = &config.file;
     let resolved = toml::to_string(f).map_err(|e| e.to_string())?;
     std::fs::write(logs.join("case.resolved.toml"), resolved).map_err(|e| e.to_string())?;
     let s = Session::create(&config.folder, f.run.dem_ranks, f.run.cfd_ranks, f.limits.wait, START);
     let s = s.map_err(|e| format!("the private folder of the run: {e}"))?;
-    let result = start(config, &home, &s, &logs, stop);
+    let result = start(config, &home, &s, &logs, from, stop);
     voidage_shm::janitor::clean(&s).map_err(|e| format!("cleaning {}: {e}", s.root.display()))?;
     result
 }
@@ -100,6 +113,7 @@ fn start(
     home: &Companions,
     s: &Session,
     logs: &Path,
+    from: Option<&Restart>,
     stop: &AtomicBool,
 ) -> Result<Outcome, String> {
     let f = &config.file;
@@ -114,6 +128,7 @@ fn start(
     std::fs::create_dir(&shared).map_err(|e| format!("{}: {e}", shared.display()))?;
     let mut couple = mpirun(1, &shared, &[&session]);
     couple.extend([text(&home.voidage), "couple".into(), text(&config.folder), "--resolved".into()]);
+    couple.extend(from.iter().flat_map(|r| ["--restart".to_string(), text(&r.folder)]));
     let mut dem = mpirun(f.run.dem_ranks, &shared, &[&session, &preload]);
     dem.extend([
         f.dem.program.clone(),
@@ -123,9 +138,15 @@ fn start(
         text(&logs.join("liggghts.log")),
     ]);
     dem.extend(f.dem.variables.iter().flat_map(|(k, v)| ["-var".to_string(), k.clone(), v.clone()]));
+    let file = from.map_or_else(|| "none".into(), |r| text(&r.particles()));
+    dem.extend(["-var", "voidage_restart", if from.is_some() { "1" } else { "0" }].map(String::from));
+    dem.extend(["-var".into(), "voidage_restart_file".into(), file]);
     let mut cfd = mpirun(f.run.cfd_ranks, &shared, &[&session, &foam]);
     let solver = if f.fluid.solver == "voidageFoam" { text(&home.solver) } else { f.fluid.solver.clone() };
     cfd.extend([solver, "-case".into(), text(&config.fluid_case())]);
+    if let Some(r) = from.filter(|_| f.fluid.solver == "voidageFoam") {
+        cfd.extend(["-restartTime".to_string(), r.state.time.to_string()]);
+    }
     if f.run.cfd_ranks > 1 {
         cfd.push("-parallel".into());
     }

@@ -3,6 +3,7 @@
 //! (`picture`), at the fluid's write times. Reads the step's fields; changes nothing.
 
 pub mod picture;
+pub mod restart;
 pub mod vtk;
 
 use crate::config::Config;
@@ -18,23 +19,27 @@ pub struct Output {
     cells: Option<vtk::Series>,
     particles: Option<vtk::Series>,
     camera: Option<Camera>,
+    suffix: String,
 }
 
 impl Output {
     /// Makes CASE/voidage if anything is to be written.
-    pub fn new(c: &Config) -> io::Result<Self> {
+    ///
+    /// `from`: fluid time of a restart (s); the series go on with it, the pictures begin anew under another name.
+    pub fn new(c: &Config, from: Option<f64>) -> io::Result<Self> {
         let folder = c.folder.join("voidage");
         let o = &c.file.output;
         if o.fields || o.particles || o.picture != "none" {
             std::fs::create_dir_all(&folder)?;
         }
-        let series = |on: bool, name: &str| on.then(|| vtk::Series::new(&folder, name));
+        let series = |on: bool, name: &str| on.then(|| vtk::Series::new(&folder, name, from));
         let axis = ["x", "y", "z"].iter().position(|a| *a == o.picture);
         Ok(Self {
             cells: series(o.fields, "cells"),
             particles: series(o.particles, "particles"),
             camera: axis.map(Camera::new),
             folder,
+            suffix: from.map(|t| format!("-from-{t}")).unwrap_or_default(),
         })
     }
 
@@ -75,7 +80,7 @@ impl Output {
         match &self.camera {
             Some(camera) => {
                 camera.save_last(&self.folder.join("bed.png"))?;
-                camera.save_animation(&self.folder.join("bed-animation.png"))
+                camera.save_animation(&self.folder.join(format!("bed-animation{}.png", self.suffix)))
             }
             None => Ok(()),
         }

@@ -23,8 +23,15 @@ pub struct Series {
 
 impl Series {
     /// FOLDER/NAME.pvd with parts FOLDER/NAME_0000.EXT.
-    pub fn new(folder: &Path, name: &str) -> Self {
-        Self { folder: folder.into(), name: name.into(), parts: Vec::new() }
+    /// `from`: go on with the series of an earlier run up to this time.
+    pub fn new(folder: &Path, name: &str, from: Option<f64>) -> Self {
+        let text = from.and_then(|_| fs::read_to_string(folder.join(format!("{name}.pvd"))).ok());
+        let value = |line: &str, key: &str| Some(line.split_once(key)?.1.split('"').next()?.to_string());
+        let part = |l: &str| Some((value(l, "timestep=\"")?.parse().ok()?, value(l, "file=\"")?));
+        let parts: Vec<(f64, String)> = text.unwrap_or_default().lines().filter_map(part).collect();
+        let end = from.unwrap_or(0.0) * (1.0 + 1e-12);
+        let parts = parts.into_iter().filter(|p| p.0 <= end).collect();
+        Self { folder: folder.into(), name: name.into(), parts }
     }
     /// Writes the next part and the list of all so far.
     pub fn write(

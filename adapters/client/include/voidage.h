@@ -25,6 +25,9 @@
 // message kind drive
 #define VOIDAGE_DRIVE 11
 
+// message kind written: DEM to coupler, the restart file asked for in VOIDAGE_DRIVE is written
+#define VOIDAGE_WRITTEN 12
+
 // message kind mesh
 #define VOIDAGE_MESH 20
 
@@ -78,6 +81,9 @@
 
 // arrays of VOIDAGE_DRIVE, same n and order as the particles sent, coupler to DEM: impulse charged to the fluid for the coming interval, N s
 #define VOIDAGE_CHARGED 23
+
+// arrays of VOIDAGE_DRIVE, at the fluid's write times: bytes, the restart file to write; with it VOIDAGE_FLAGS (last step)
+#define VOIDAGE_RESTART_FILE 24
 
 // arrays of VOIDAGE_FIELDS, c cells, CFD to coupler: m/s
 #define VOIDAGE_FLUID_VELOCITY 30

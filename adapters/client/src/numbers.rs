@@ -9,6 +9,8 @@ pub const VOIDAGE_CFD: i32 = 2;
 pub const VOIDAGE_PARTICLES: i32 = 10;
 /// message kind drive
 pub const VOIDAGE_DRIVE: i32 = 11;
+/// message kind written: DEM to coupler, the restart file asked for in VOIDAGE_DRIVE is written
+pub const VOIDAGE_WRITTEN: i32 = 12;
 /// message kind mesh
 pub const VOIDAGE_MESH: i32 = 20;
 /// message kind fields
@@ -45,6 +47,8 @@ pub const VOIDAGE_DRIVE_VELOCITY: u32 = 21;
 pub const VOIDAGE_FORCE: u32 = 22;
 /// arrays of VOIDAGE_DRIVE, same n and order as the particles sent, coupler to DEM: impulse charged to the fluid for the coming interval, N s
 pub const VOIDAGE_CHARGED: u32 = 23;
+/// arrays of VOIDAGE_DRIVE, at the fluid's write times: bytes, the restart file to write; with it VOIDAGE_FLAGS (last step)
+pub const VOIDAGE_RESTART_FILE: u32 = 24;
 /// arrays of VOIDAGE_FIELDS, c cells, CFD to coupler: m/s
 pub const VOIDAGE_FLUID_VELOCITY: u32 = 30;
 /// arrays of VOIDAGE_FIELDS, c cells, CFD to coupler: Pa/m, of the last velocity correction

@@ -34,6 +34,8 @@ pub mod kind {
     pub const PARTICLES: u32 = 10;
     /// Coupler to DEM: what drives the particles for the next interval.
     pub const DRIVE: u32 = 11;
+    /// DEM to coupler: the restart file asked for in DRIVE is written.
+    pub const WRITTEN: u32 = 12;
     /// CFD to coupler: the mesh of one rank.
     pub const MESH: u32 = 20;
     /// CFD to coupler: the fluid at the end of a step.
@@ -61,6 +63,7 @@ pub mod field {
     pub const DRIVE_VELOCITY: u32 = 21;
     pub const FORCE: u32 = 22;
     pub const CHARGED: u32 = 23;
+    pub const RESTART_FILE: u32 = 24;
     pub const FLUID_VELOCITY: u32 = 30;
     pub const PRESSURE_GRADIENT: u32 = 31;
     pub const STRESS_DIVERGENCE: u32 = 32;

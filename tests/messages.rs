@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Bad input: every message of `voidage check` says where, what was given, what is accepted and what to type.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for e in std::fs::read_dir(from).unwrap().flatten() {
+        let to = to.join(e.file_name());
+        if e.path().is_dir() {
+            copy(&e.path(), &to);
+        } else {
+            std::fs::copy(e.path(), to).unwrap();
+        }
+    }
+}
+
+/// A change of a file: (file, old text, new text).
+type Edit<'a> = (&'a str, &'a str, &'a str);
+
+/// Case, edits, overrides, words of the message.
+type Message<'a> = (&'a str, &'a [Edit<'a>], &'a [&'a str], &'a [&'a str]);
+
+/// Checks a changed copy of a case; the exit code and what is printed.
+fn check(name: &str, case: &str, edits: &[Edit], set: &[&str]) -> (i32, String) {
+    let to = std::env::temp_dir().join(format!("voidage-messages-{name}-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&to);
+    copy(&PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("cases").join(case), &to);
+    for (file, old, new) in edits {
+        let text = std::fs::read_to_string(to.join(file)).unwrap();
+        assert!(text.contains(old), "{file}: {old}");
+        std::fs::write(to.join(file), text.replace(old, new)).unwrap();
+    }
+    let mut c = Command::new(env!("CARGO_BIN_EXE_voidage"));
+    c.arg("check").arg(&to);
+    set.iter().for_each(|s| {
+        c.args(["--set", s]);
+    });
+    let out = c.output().unwrap();
+    std::fs::remove_dir_all(&to).unwrap();
+    (out.status.code().unwrap(), String::from_utf8_lossy(&out.stderr).into_owned())
+}
+
+const SETTLING: &str = "settling";
+const BED: &str = "fluidised-bed";
+const CONTROL: &str = "fluid/system/controlDict";
+
+#[test]
+fn the_cases_are_without_errors() {
+    for case in [SETTLING, BED, "periodic-box"] {
+        let (code, text) = check(&format!("good-{case}"), case, &[], &[]);
+        assert!(code == 0 && !text.contains("error:"), "{case}: {text}");
+    }
+}
+
+#[test]
+fn errors() {
+    let table: &[Message] = &[
+        (
+            SETTLING,
+            &[("case.toml", "format = 1", "format = 2")],
+            &[],
+            &["format = 2", "reads format 1", "format = 1"],
+        ),
+        (
+            SETTLING,
+            &[],
+            &["fluid.density=1e9"],
+            &["fluid.density = 1000000000", "are the units right?", "kg/m3"],
+        ),
+        (SETTLING, &[], &["fluid.kinematic_viscosity=1e5"], &["fluid.kinematic_viscosity = 100000", "units"]),
+        (SETTLING, &[], &["dem.time_step=10.0"], &["dem.time_step = 10", "between 1e-12 and 1e0 s"]),
+        (SETTLING, &[], &["limits.wait=0.1"], &["limits.wait = 0.1", "between 1e0"]),
+        (SETTLING, &[], &["limits.voidage_min=2.0"], &["limits.voidage_min = 2", "between"]),
+        (BED, &[], &["smooth.tolerance=0.5"], &["smooth.tolerance = 0.5", "between"]),
+        (BED, &[], &["smooth.bandwidth=0.0"], &["smooth.bandwidth = 0", "give smooth.bandwidth in m"]),
+        (SETTLING, &[], &["run.dem_ranks=0"], &["run.dem_ranks = 0", "at least 1", "run.dem_ranks = 1"]),
+        (SETTLING, &[], &["run.cfd_ranks=0"], &["run.cfd_ranks = 0", "run.cfd_ranks = 1"]),
+        (SETTLING, &[], &["coupling.interval=0"], &["coupling.interval = 0", "coupling.interval = 20"]),
+        (
+            SETTLING,
+            &[],
+            &["forces.pressure_gradient=false"],
+            &["forces = pressure_gradient", "action is not reaction", "coupling.model = \"B\""],
+        ),
+        (SETTLING, &[], &["fluid.solver=pimpleFoam"], &["fluid.solver = pimpleFoam", "model B only"]),
+        (
+            SETTLING,
+            &[],
+            &["fluid.gravity_treatment=in-pressure", "fluid.gravity=[0.0,0.0,0.0]"],
+            &["fluid.gravity_treatment = in-pressure", "needs a gravity"],
+        ),
+        (
+            SETTLING,
+            &[],
+            &["fluid.gravity_treatment=in-pressure", "fluid.solver=pimpleFoam"],
+            &["would act twice", "gravity_treatment = \"archimedes\""],
+        ),
+        (
+            SETTLING,
+            &[],
+            &["fluid.mean_pressure_gradient=[0.0,0.0,-98.1]"],
+            &[
+                "fluid.mean_pressure_gradient = [0.0, 0.0, -98.1]",
+                "hydrostatic",
+                "would act twice",
+                "\"none\"",
+            ],
+        ),
+        (
+            SETTLING,
+            &[(CONTROL, "deltaT 2e-4;", "deltaT 2e-4;\nadjustTimeStep yes;")],
+            &[],
+            &["adjustTimeStep = yes", "fixed fluid step", "adjustTimeStep no;"],
+        ),
+        (SETTLING, &[], &["coupling.interval=21"], &["coupling.interval = 21", "coupling.interval = 20"]),
+        (SETTLING, &[(CONTROL, "deltaT 2e-4;", "deltaT 2.05e-4;")], &[], &["controlDict: deltaT 2e-4;"]),
+        (SETTLING, &[(CONTROL, "endTime 0.24;", "endTime 0;")], &[], &["endTime", "nothing to run"]),
+        (SETTLING, &[(CONTROL, "endTime 0.24;", "endTime 0.00031;")], &[], &["whole number of steps"]),
+        (SETTLING, &[("particles.in", "units           si", "units lj")], &[], &["units = lj", "units si"]),
+        (SETTLING, &[("particles.in", "run             1000000000", "")], &[], &["has no `run`", "add: run"]),
+        (
+            SETTLING,
+            &[("particles.in", "diameter 1e-4", "diameter 100")],
+            &[],
+            &["radius = 50", "lengths in m"],
+        ),
+        (
+            SETTLING,
+            &[("particles.in", "0 0.1 0 0.1 0 0.1", "0 0.1 0 0.1 5 6")],
+            &[],
+            &["DEM box in z = [5, 6]", "do not overlap", "[0, 0.1]"],
+        ),
+        (
+            "periodic-box",
+            &[("particles.in", "block 0 0.002605", "block 0 0.003")],
+            &[],
+            &["DEM box in x", "equal in periodic directions"],
+        ),
+        (
+            SETTLING,
+            &[],
+            &["coupling.scheme=explicit", "coupling.interval=2000"],
+            &[
+                "tau_p: explicit coupling is unstable",
+                "R eq. 9",
+                "R eq. 10",
+                "coupling.scheme = \"conservative\"",
+            ],
+        ),
+        (
+            SETTLING,
+            &[],
+            &["dem.force=constant"],
+            &["the constant force errs by 0.6 % of the drag", "dem.force = \"implicit\""],
+        ),
+        (SETTLING, &[], &["fluid.case=nowhere"], &["fluid.case = nowhere", "controlDict"]),
+    ];
+    for (i, (case, edits, set, says)) in table.iter().enumerate() {
+        let (code, text) = check(&format!("e{i}"), case, edits, set);
+        assert_eq!(code, 2, "{set:?} {edits:?}: {text}");
+        for w in *says {
+            assert!(text.contains(w), "{w:?} is missing ({set:?} {edits:?}): {text}");
+        }
+    }
+}
+
+#[test]
+fn warnings() {
+    let smooth = "smooth.method=chebyshev";
+    let no_slip = ("fluid/0/U", "frontAndBack { type slip; }", "frontAndBack { type noSlip; }");
+    let table: &[Message] = &[
+        (
+            SETTLING,
+            &[],
+            &[smooth, "smooth.bandwidth=5e-5"],
+            &["below one particle diameter", "smooth.bandwidth = 4e-4"],
+        ),
+        (
+            SETTLING,
+            &[],
+            &[smooth, "smooth.bandwidth=1e-3"],
+            &["less than half the mean cell size 1.000e-2 m"],
+        ),
+        (SETTLING, &[], &["dem.force=constant"], &["errs by K Δt/(2 m)"]),
+        (
+            SETTLING,
+            &[("particles.in", "0 0.1 0 0.1 0 0.1", "0 0.1 0 0.1 0 0.2")],
+            &[],
+            &["DEM box in z = [0, 0.2]", "limits.outside = \"exclude\""],
+        ),
+        // 2 (b/L)² = 2 (4.8/10)² = 46 %
+        (
+            BED,
+            &[no_slip],
+            &[],
+            &["smooth.bandwidth = 0.0048", "about -46 %", "interpolate.fluid_velocity = \"linear\""],
+        ),
+        (
+            BED,
+            &[(CONTROL, "deltaT 2e-4;", "deltaT 2e-3;")],
+            &["coupling.interval=200"],
+            &["Courant number", "R eq. 11"],
+        ),
+        (
+            SETTLING,
+            &[("particles.in", "diameter 1e-4", "diameter 4e-3")],
+            &[],
+            &["smaller than three particle diameters", "smooth.method = \"chebyshev\""],
+        ),
+        (
+            SETTLING,
+            &[("particles.in", "diameter 1e-4", "diameter 1e-6")],
+            &[],
+            &["reacts about 120 steps late", "tau_f", "longer than the particle relaxation time"],
+        ),
+        (
+            SETTLING,
+            &[("particles.in", "diameter 1e-4", "diameter 2e-5")],
+            &["coupling.scheme=explicit"],
+            &["tau_f: explicit coupling may be unstable", "R eq. 10"],
+        ),
+    ];
+    for (i, (case, edits, set, says)) in table.iter().enumerate() {
+        let (_, text) = check(&format!("w{i}"), case, edits, set);
+        let lines: Vec<&str> = text.lines().filter(|l| l.starts_with("warning:")).collect();
+        for w in *says {
+            assert!(lines.iter().any(|l| l.contains(w)), "{w:?} is missing ({set:?} {edits:?}): {text}");
+        }
+    }
+    // settled walls that let the fluid slip have no profile: nothing to warn of
+    assert!(!check("slip", BED, &[], &[]).1.contains("laminar profile"));
+}
