@@ -208,7 +208,8 @@ impl<T: Transport> Exchange<'_, T> {
         for (i, f) in frames.iter().enumerate() {
             Self::in_step(f.step(), k, &self.partners.who(i))?;
         }
-        Particles::receive(&frames).map_err(|source| CoupleError::Particle { step: k, source })
+        Particles::receive(&frames, self.step.places())
+            .map_err(|source| CoupleError::Particle { step: k, source })
     }
 
     /// The fluid of all CFD ranks by cell slot; (last step, write time, Σ reaction in N s).

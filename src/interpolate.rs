@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Stage 5, interpolate: the fluid velocity that enters the drag.
 //!
-//! Reads raw cell fields (lanes 0–2 fluid velocity, m/s) and the gathered velocity; writes u at a particle.
+//! Reads the fluid velocity of the cells (m/s) and the gathered velocity; writes u at a particle.
 //! Whatever is chosen, the difference d = u − ũ goes through the defect correction (design §2.2).
 
 use crate::mesh::Mesh;
-use crate::step::Lanes;
 
 /// How u_i is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,12 +31,12 @@ impl FluidVelocity {
 pub fn fluid_velocity(
     how: FluidVelocity,
     mesh: &Mesh,
-    fluid: &[Lanes],
+    fluid: &[[f64; 3]],
     host: usize,
     position: [f64; 3],
     gathered: [f64; 3],
 ) -> [f64; 3] {
-    let u = [fluid[host][0], fluid[host][1], fluid[host][2]];
+    let u = fluid[host];
     match how {
         FluidVelocity::Gather => gathered,
         FluidVelocity::HostCell => u,
@@ -49,12 +48,13 @@ pub fn fluid_velocity(
     }
 }
 
-/// Least-squares gradient of lanes 0–2 over the face neighbours; directions without neighbours get zero.
-fn gradient(mesh: &Mesh, fluid: &[Lanes], host: usize) -> [[f64; 3]; 3] {
+/// Least-squares gradient of the velocity over the face neighbours; directions without neighbours get zero.
+fn gradient(mesh: &Mesh, fluid: &[[f64; 3]], host: usize) -> [[f64; 3]; 3] {
     let (mut m, mut b) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
     for side in mesh.sides(host).iter().filter(|s| s.across != crate::mesh::NONE) {
         let other = side.across as usize;
-        let r = [0, 1, 2].map(|a| mesh.centre[other][a] - side.shift[a] - mesh.centre[host][a]);
+        let shift = mesh.shift(side);
+        let r = [0, 1, 2].map(|a| mesh.centre[other][a] - shift[a] - mesh.centre[host][a]);
         let w = 1.0 / (r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
         for i in 0..3 {
             (0..3).for_each(|j| m[i][j] += w * r[i] * r[j]);

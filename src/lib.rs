@@ -2,7 +2,7 @@
 //! voidage: the coupling step between a fluid and a particle program, each running on its own.
 //!
 //! One step, in the order of the modules: `particles` receives them, `locate` finds host cells in the
-//! coupler's own `mesh`, `map` deposits, `smooth` diffuses, `interpolate` reads the fluid at the particles,
+//! coupler's own `mesh`, `arrange` orders them by cell, `map` deposits, `smooth` diffuses, `interpolate` reads the fluid at the particles,
 //! `forces` computes drag, `scheme` predicts and `linearise` turns it into sources; the fluid solves its
 //! step; what it returns is smoothed by the same operator and drives the particles. `step` is this list.
 #![forbid(unsafe_code)]
@@ -11,6 +11,8 @@ pub mod mesh;
 pub mod particles;
 
 pub mod locate;
+
+pub mod arrange;
 
 pub mod map;
 
@@ -27,6 +29,7 @@ pub mod linearise;
 pub mod step;
 
 pub mod balance;
+pub mod bench;
 pub mod commands;
 pub mod config;
 pub mod sums;

@@ -5,7 +5,7 @@
 //! faces. A point on a face belongs to the cell its normal points out of, so to exactly one. On meshes with
 //! plane faces the answer does not depend on the first guess; on warped faces the guess is not used.
 
-use crate::mesh::{Mesh, NONE};
+use crate::mesh::{Mesh, NONE, Side};
 
 /// A particle without a host cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,10 +25,6 @@ pub struct Locator {
     bins: [usize; 3],
     seed: Vec<u32>,
     planar: bool,
-    /// per side: outward normal and offset, contiguous; all that is read while a particle stays in its cell
-    planes: Vec<[f64; 4]>,
-    /// distance a point may lie outside a boundary face of a cell, m
-    tolerance: Vec<f64>,
 }
 
 /// Distance a point may lie outside a boundary face, relative to the cell size: rounding only.
@@ -48,16 +44,7 @@ impl Locator {
         let size = (extent.iter().product::<f64>() / mesh.len() as f64).cbrt();
         let bins = extent.map(|e| ((e / size).round() as usize).clamp(1, 1000));
         let bin = [0, 1, 2].map(|a| extent[a] / bins[a] as f64);
-        let tolerance = mesh.volume.iter().map(|v| BOUNDARY * v.cbrt()).collect();
-        let mut l = Self {
-            lower,
-            bin,
-            bins,
-            seed: vec![NONE; bins.iter().product()],
-            planar: planar(mesh),
-            planes: mesh.sides.iter().map(plane).collect(),
-            tolerance,
-        };
+        let mut l = Self { lower, bin, bins, seed: vec![NONE; bins.iter().product()], planar: planar(mesh) };
         for (slot, c) in mesh.centre.iter().enumerate() {
             let b = l.bin_of(*c);
             if l.seed[b] == NONE {
@@ -105,22 +92,16 @@ impl Locator {
     }
 }
 
-fn plane(s: &crate::mesh::Side) -> [f64; 4] {
-    [s.sign * s.normal[0], s.sign * s.normal[1], s.sign * s.normal[2], s.sign * s.offset]
-}
-
 /// How far `x` lies beyond a side (> 0: outside), and whether it belongs to the cell across.
-fn beyond(side: &crate::mesh::Side, x: &[f64; 3]) -> (f64, bool) {
-    let n = &side.normal;
-    let s = (n[0] * x[0] + n[1] * x[1] + n[2] * x[2]) - side.offset;
+fn beyond(mesh: &Mesh, side: &Side, x: &[f64; 3]) -> (f64, bool) {
+    let s = side.beyond(x);
     // on the face (s = 0): inside the cell the normal leaves, outside the other; of the two images on a pair of
     // cyclic faces the lower one is inside
-    let on = match side.shift.iter().find(|x| **x != 0.0) {
+    let on = || match mesh.shift(side).iter().find(|x| **x != 0.0) {
         Some(shift) => *shift < 0.0,
-        None => side.sign < 0.0,
+        None => !side.outward(),
     };
-    let leaves = side.sign * s > 0.0 || (s == 0.0 && on);
-    (side.sign * s, leaves)
+    (s, s > 0.0 || (s == 0.0 && on()))
 }
 
 impl Locator {
@@ -136,19 +117,18 @@ impl Locator {
                 (seen, next_mark) = ((cell, *x), 2 * next_mark);
             }
             // nearly always: strictly inside, no side needs a closer look
-            let range = mesh.side_start[cell as usize] as usize..mesh.side_start[cell as usize + 1] as usize;
-            let out = |p: &[f64; 4]| (p[0] * x[0] + p[1] * x[1] + p[2] * x[2]) - p[3];
-            let deepest = self.planes[range].iter().map(out).fold(f64::NEG_INFINITY, f64::max);
+            let sides = mesh.sides(cell as usize);
+            let deepest = sides.iter().map(|s| s.beyond(x)).fold(f64::NEG_INFINITY, f64::max);
             if deepest < 0.0 {
                 return Walk::Found(cell);
             }
-            let tolerance = self.tolerance[cell as usize];
+            let tolerance = BOUNDARY * mesh.volume[cell as usize].cbrt();
             let (mut inner, mut wall) = (None::<(f64, usize)>, None::<u32>);
-            for (i, side) in mesh.sides(cell as usize).iter().enumerate() {
-                let (distance, leaves) = beyond(side, x);
+            for (i, side) in sides.iter().enumerate() {
+                let (distance, leaves) = beyond(mesh, side, x);
                 if side.across == NONE {
                     if distance > tolerance {
-                        wall = wall.or(Some(side.patch));
+                        wall = wall.or(Some(side.patch()));
                     }
                 } else if leaves && inner.is_none_or(|b| distance > b.0) {
                     inner = Some((distance, i));
@@ -156,9 +136,9 @@ impl Locator {
             }
             match (inner, wall) {
                 (Some((_, i)), _) => {
-                    let side = mesh.sides(cell as usize)[i];
-                    cell = side.across;
-                    (0..3).for_each(|a| x[a] += side.shift[a]);
+                    cell = sides[i].across;
+                    let shift = mesh.shift(&sides[i]);
+                    (0..3).for_each(|a| x[a] += shift[a]);
                 }
                 (None, Some(patch)) => return Walk::Boundary(patch),
                 (None, None) => return Walk::Found(cell),
@@ -180,7 +160,7 @@ fn search(mesh: &Mesh, x: [f64; 3], planar: bool) -> Option<u32> {
         let allowed = if planar { BOUNDARY * size } else { GAP * size };
         let mut worst = 0.0f64;
         for side in mesh.sides(cell) {
-            let (distance, leaves) = beyond(side, &x);
+            let (distance, leaves) = beyond(mesh, side, &x);
             let limit = if side.across == NONE { BOUNDARY * size } else { allowed };
             if distance > limit || (planar && leaves) {
                 worst = f64::INFINITY;
@@ -197,14 +177,11 @@ fn search(mesh: &Mesh, x: [f64; 3], planar: bool) -> Option<u32> {
 
 /// All faces flat to rounding? Then cells are convex cuts and the walk's end is unique.
 fn planar(mesh: &Mesh) -> bool {
-    mesh.faces.of_cell.iter().enumerate().all(|(slot, faces)| {
+    (0..mesh.len()).all(|slot| {
         let tolerance = 1e-9 * mesh.volume[slot].cbrt();
-        faces.iter().all(|face| {
-            let p: Vec<_> = face.iter().map(|i| mesh.faces.points[*i as usize]).collect();
-            let on = |s: &crate::mesh::Side, x: &[f64; 3]| {
-                (s.normal[0] * x[0] + s.normal[1] * x[1] + s.normal[2] * x[2] - s.offset).abs() <= tolerance
-            };
-            mesh.sides(slot).iter().any(|s| p.iter().all(|x| on(s, x)))
-        })
+        let flat = |(side, points): (&Side, &[u32])| {
+            points.iter().all(|p| side.beyond(&mesh.faces.points[*p as usize]).abs() <= tolerance)
+        };
+        mesh.sides(slot).iter().zip(mesh.loops(slot)).all(flat)
     })
 }

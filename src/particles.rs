@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Stage 1, receive: particles of all DEM ranks, in the order of their ids.
+//! Stage 1, receive: particles of all DEM ranks in one table.
 //!
-//! Reads PARTICLES frames (SI units); writes one table sorted by id, so that no later sum depends on how
-//! the DEM is split or in which order particles arrive. Does not know the mesh.
+//! Reads PARTICLES frames (SI units); writes one table in which every particle keeps its place of the last
+//! exchange (by cell, `arrange`), new ones behind in the order of their ids. Does not know the mesh.
 
+use crate::arrange::Places;
+use crate::mesh::NONE;
 use std::f64::consts::PI;
 use thiserror::Error;
 use voidage_wire::{Frame, WireError, field};
 
-/// All particles of one exchange, sorted by id.
+/// All particles of one exchange; the order is that of the last exchange, no result depends on it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Particles {
-    /// global id, ascending
+    /// global id
     pub id: Vec<i64>,
     /// DEM rank and position in its message
     pub origin: Vec<(u32, u32)>,
@@ -82,13 +84,10 @@ impl Particles {
         4.0 / 3.0 * PI * r * r * r
     }
 
-    /// Merges the messages of all DEM ranks (in rank order).
-    pub fn receive(frames: &[Frame]) -> Result<Self, ParticleError> {
+    /// Merges the messages of all DEM ranks (in rank order); `last`: where the particles were.
+    pub fn receive(frames: &[Frame], last: &Places) -> Result<Self, ParticleError> {
         let ids = frames.iter().map(|f| f.i64s(field::ID)).collect::<Result<Vec<_>, _>>()?;
-        let order = in_order(&ids);
-        if let Some(w) = order.windows(2).find(|w| w[0].0 == w[1].0) {
-            return Err(ParticleError::Duplicate { id: w[0].0, first: w[0].1, second: w[1].1 });
-        }
+        let order = in_order(&ids, last)?;
         let vectors = |name: u32| -> Result<Vec<[f64; 3]>, WireError> {
             let parts = frames.iter().zip(&ids).map(|(f, i)| f.vectors_of(name, i.len()));
             let parts = parts.collect::<Result<Vec<_>, _>>()?;
@@ -138,34 +137,34 @@ impl Particles {
     }
 }
 
-/// (id, rank, position) by id. Ids are nearly dense as a rule: then by counting, else by sorting.
-fn in_order(ids: &[&[i64]]) -> Vec<(i64, u32, u32)> {
-    let all = || {
-        let of_rank = |(rank, list): (usize, &&[i64])| {
-            let list: Vec<_> = list.iter().enumerate().map(|(k, id)| (*id, rank as u32, k as u32)).collect();
-            list
-        };
-        ids.iter().enumerate().flat_map(of_rank)
+/// (id, rank, position in its message) of all particles: known ones in their last order, then new ones by id.
+fn in_order(ids: &[&[i64]], last: &Places) -> Result<Vec<(i64, u32, u32)>, ParticleError> {
+    let twice = |a: &(i64, u32, u32), b: &(i64, u32, u32)| ParticleError::Duplicate {
+        id: a.0,
+        first: a.1.min(b.1),
+        second: a.1.max(b.1),
     };
-    let n: usize = ids.iter().map(|i| i.len()).sum();
-    let (low, high) = all().fold((i64::MAX, i64::MIN), |(l, h), p| (l.min(p.0), h.max(p.0)));
-    let span = i128::from(high) - i128::from(low);
-    if n > 0 && span < 4 * n as i128 {
-        let mut place = vec![(0, u32::MAX, 0); span as usize + 1];
-        let mut twice = false;
-        for p in all() {
-            let slot = &mut place[(p.0 - low) as usize];
-            twice |= slot.1 != u32::MAX;
-            *slot = p;
-        }
-        if !twice {
-            place.retain(|p| p.1 != u32::MAX);
-            return place;
+    let mut order = vec![(0, NONE, 0); last.len()];
+    let mut new = Vec::new();
+    for (rank, list) in ids.iter().enumerate() {
+        for (k, id) in list.iter().enumerate() {
+            let particle = (*id, rank as u32, k as u32);
+            match order.get_mut(last.of(*id) as usize) {
+                Some(place) if place.1 == NONE => *place = particle,
+                Some(place) => return Err(twice(place, &particle)),
+                None => new.push(particle),
+            }
         }
     }
-    let mut order: Vec<_> = all().collect();
-    order.sort_unstable();
-    order
+    order.retain(|p| p.1 != NONE);
+    if !new.is_sorted() {
+        new.sort_unstable();
+    }
+    if let Some(w) = new.windows(2).find(|w| w[0].0 == w[1].0) {
+        return Err(twice(&w[0], &w[1]));
+    }
+    order.append(&mut new);
+    Ok(order)
 }
 
 #[cfg(test)]
@@ -194,24 +193,39 @@ pub(crate) mod tests {
     fn the_table_does_not_depend_on_ranks_and_order() {
         let all: Vec<_> = (0..50).map(|i| (i * 7 % 50, [i as f64, 0.5, 0.25])).collect();
         let whole = message(&all);
-        let one = Particles::receive(&[Frame::parse(&whole).unwrap()]).unwrap();
+        let first = Places::default();
+        let one = Particles::receive(&[Frame::parse(&whole).unwrap()], &first).unwrap();
         let (a, b): (Vec<_>, Vec<_>) = all.iter().rev().partition(|p| p.0 % 3 == 0);
         let (a, b) = (message(&a), message(&b));
-        let two = Particles::receive(&[Frame::parse(&a).unwrap(), Frame::parse(&b).unwrap()]).unwrap();
+        let frames = [Frame::parse(&a).unwrap(), Frame::parse(&b).unwrap()];
+        let two = Particles::receive(&frames, &first).unwrap();
+        assert!(one.id.is_sorted());
         assert_eq!(Particles { origin: vec![], ..one }, Particles { origin: vec![], ..two });
+        // later the places of the last exchange are kept: 2 has gone, 50 is new
+        let mut last = Places::default();
+        last.update(&[49, 2, 3, 1]);
+        let later = message(&[1, 50, 3, 49, 0].map(|id| (id, [0.0; 3])));
+        let p = Particles::receive(&[Frame::parse(&later).unwrap()], &last).unwrap();
+        assert_eq!(p.id, [49, 3, 1, 0, 50]);
+        assert_eq!(p.origin[0], (0, 3));
     }
 
     #[test]
     fn wrong_particles_are_named() {
         let mut m = message(&[(3, [0.0; 3]), (9, [f64::NAN, 0.0, 0.0])]);
-        let e = Particles::receive(&[Frame::parse(&m).unwrap()]).unwrap_err().to_string();
+        let e = Particles::receive(&[Frame::parse(&m).unwrap()], &Places::default()).unwrap_err().to_string();
         assert!(e.starts_with("particle 9 (DEM rank 0): position [NaN"), "{e}");
         frame::f64s_mut(&mut m, field::POSITION).unwrap()[3] = 0.0;
         frame::f64s_mut(&mut m, field::RADIUS).unwrap()[0] = -1.0;
-        let e = Particles::receive(&[Frame::parse(&m).unwrap()]).unwrap_err().to_string();
+        let e = Particles::receive(&[Frame::parse(&m).unwrap()], &Places::default()).unwrap_err().to_string();
         assert!(e.contains("particle 3") && e.contains("radius -1"), "{e}");
         let (a, b) = (message(&[(3, [0.0; 3])]), message(&[(3, [1.0; 3])]));
-        let e = Particles::receive(&[Frame::parse(&a).unwrap(), Frame::parse(&b).unwrap()]).unwrap_err();
-        assert!(e.to_string().contains("id 3 came twice, from DEM ranks 0 and 1"));
+        let frames = [Frame::parse(&a).unwrap(), Frame::parse(&b).unwrap()];
+        let mut last = Places::default();
+        for ids in [&[][..], &[3][..]] {
+            last.update(ids);
+            let e = Particles::receive(&frames, &last).unwrap_err();
+            assert!(e.to_string().contains("id 3 came twice, from DEM ranks 0 and 1"));
+        }
     }
 }

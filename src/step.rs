@@ -3,20 +3,22 @@
 //!
 //! `before_fluid`: particles of exchange k in, voidage and sources of fluid step k out (stages 2 to 7).
 //! `after_fluid`: the fluid's answer in, what drives the particles out (stage 9).
-//! Units SI. Does not know processes, files or clocks; owns scratch memory and nothing that changes results,
-//! except the fluid gathered last, which is part of the exchange.
+//! Units SI. Does not know processes or files; times the stages; owns scratch memory and nothing that changes
+//! results, except the last fluid velocity, which is part of the exchange.
 
+use crate::arrange::{Order, Places};
 use crate::balance::{Books, ratio};
 use crate::forces::{DragLaw, Slip};
 use crate::interpolate::{self, FluidVelocity};
 use crate::linearise::{Predicted, linearise};
 use crate::locate::{Locator, Lost};
 use crate::map::{Mapping, Weights};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, NONE};
 use crate::particles::Particles;
 use crate::scheme::Scheme;
 use crate::smooth::{Active, Smoother};
-use crate::sums::{norm, sum, sum3};
+use crate::sums::{Sum, norm};
+use std::time::Instant;
 use thiserror::Error;
 
 /// Fields of a cell: eight lanes, smoothed together.
@@ -147,6 +149,20 @@ pub struct Facts {
     pub positive_redone: u64,
 }
 
+/// Wall time of the stages of the last step, s.
+#[derive(Clone, Copy, Debug, Default)]
+#[allow(missing_docs)]
+pub struct Seconds {
+    pub locate: f64,
+    pub arrange: f64,
+    pub map: f64,
+    pub solids: f64,
+    pub forces: f64,
+    pub sources: f64,
+    pub gather: f64,
+    pub drive: f64,
+}
+
 /// The coupling step of one run.
 pub struct CouplingStep {
     /// The coupler's own copy of the mesh.
@@ -156,19 +172,25 @@ pub struct CouplingStep {
     mapping: Box<dyn Mapping>,
     smoother: Box<dyn Smoother>,
     positive: Box<dyn Smoother>,
+    use_positive: bool,
     weights: Weights,
     active: Active,
+    /// host cell of each particle, in the order of the table
     hosts: Vec<u32>,
-    host_ids: Vec<i64>,
-    coupled: Vec<bool>,
-    /// raw fluid velocity (lanes 0–2) for host-cell and linear interpolation
-    fluid: Vec<Lanes>,
-    /// G of fluid velocity (0–2) and of ∇p − ∇·τ (3–5)
+    order: Order,
+    /// places and hosts of the last exchange, in its order
+    places: Places,
+    last_hosts: Vec<u32>,
+    /// the fluid of the last step as it came, m/s
+    fluid_velocity: Vec<[f64; 3]>,
+    /// lanes 0–2 G of the new fluid's velocity, 3–5 of its ∇p − ∇·τ
     gathered: Vec<Lanes>,
+    /// scratch: zero outside the rows in `dirty`
+    work: Vec<Lanes>,
+    dirty: Vec<u32>,
+    /// rows where `sources` are not those of an empty cell
+    filled: Vec<u32>,
     predicted: Vec<Predicted>,
-    lanes: Vec<Lanes>,
-    lanes_b: Vec<Lanes>,
-    use_positive: bool,
     /// Voidage and sources of this step.
     pub sources: Sources,
     /// Reply to the DEM.
@@ -177,7 +199,12 @@ pub struct CouplingStep {
     pub facts: Facts,
     /// Action–reaction books.
     pub books: Books,
+    /// What the stages took.
+    pub seconds: Seconds,
 }
+
+/// Lanes of the first pass: ε_s, ε_s U_s (1–3) and, from here, the last fluid velocity.
+const FLUID: usize = 4;
 
 impl CouplingStep {
     /// Takes the mesh and the methods; `positive` is the smoother used when a result would turn negative.
@@ -188,25 +215,26 @@ impl CouplingStep {
         smoother: Box<dyn Smoother>,
         positive: Box<dyn Smoother>,
     ) -> Self {
-        let (n, locator) = (mesh.ids.len(), Locator::new(&mesh));
-        let zero = vec![[0.0; 8]; n];
+        let (n, locator) = (mesh.len(), Locator::new(&mesh));
         Self {
             locator,
             setup,
             mapping,
             smoother,
             positive,
+            use_positive: false,
             weights: Weights::default(),
             active: Active::default(),
             hosts: Vec::new(),
-            host_ids: Vec::new(),
-            coupled: Vec::new(),
-            fluid: zero.clone(),
-            gathered: zero.clone(),
+            order: Order::default(),
+            places: Places::default(),
+            last_hosts: Vec::new(),
+            fluid_velocity: vec![[0.0; 3]; n],
+            gathered: vec![[0.0; 8]; n],
+            work: vec![[0.0; 8]; n],
+            dirty: Vec::new(),
+            filled: Vec::new(),
             predicted: Vec::new(),
-            lanes: zero.clone(),
-            lanes_b: zero,
-            use_positive: false,
             sources: Sources {
                 voidage: vec![1.0; n],
                 voidage_old: vec![1.0; n],
@@ -217,6 +245,7 @@ impl CouplingStep {
             drive: Drive::default(),
             facts: Facts::default(),
             books: Books::default(),
+            seconds: Seconds::default(),
             mesh,
         }
     }
@@ -224,20 +253,27 @@ impl CouplingStep {
     /// Puts the voidage at the start of the coming step (restart).
     pub fn restore_voidage(&mut self, voidage: &[f64]) {
         self.sources.voidage.copy_from_slice(voidage);
+        self.filled = (0..self.mesh.len() as u32).collect();
+    }
+
+    /// Where the particles of this exchange lie; those of the next one are best stored alike.
+    pub fn places(&self) -> &Places {
+        &self.places
     }
 
     /// Stages 2 to 7. `first`: exchange 0, where there is no fluid step to come and nothing is charged.
     pub fn before_fluid(&mut self, p: &mut Particles, first: bool) -> Result<(), StepError> {
-        self.facts = Facts { positive_redone: 0, excluded: 0, ..Facts::default() };
+        self.facts = Facts::default();
         self.locate(p)?;
+        let begin = Instant::now();
         self.mapping.weights(&self.mesh, &p.position, &p.radius, &self.hosts, &mut self.weights);
-        std::mem::swap(&mut self.sources.voidage, &mut self.sources.voidage_old);
+        self.sources.voidage_old.clone_from(&self.sources.voidage);
         self.use_positive = false;
+        self.seconds.map = begin.elapsed().as_secs_f64();
         loop {
             let degree = self.smoother().degree();
-            self.active.update(&self.mesh, &self.weights.cell, degree);
-            self.smooth_solids(p);
-            let fits = self.lanes.iter().all(|l| l[0] >= 0.0) && (first || self.sources_of(p));
+            self.active.update(&self.mesh, self.weights.reached(&self.order.occupied), degree);
+            let fits = self.solids(p) && (first || self.sources_of(p));
             if fits || self.use_positive {
                 break;
             }
@@ -245,24 +281,19 @@ impl CouplingStep {
             self.use_positive = true;
             self.facts.positive_redone = 1;
         }
-        self.voidage(first)
+        self.check_voidage()?;
+        if first {
+            self.sources.voidage_old.clone_from(&self.sources.voidage);
+        }
+        Ok(())
     }
 
     /// Stage 2: host cells; last hosts are only a guess where to look first.
     fn locate(&mut self, p: &mut Particles) -> Result<(), StepError> {
-        if self.host_ids != p.id {
-            let mut known = self.host_ids.iter().zip(&self.hosts).peekable();
-            let guess = p.id.iter().map(|id| {
-                while known.peek().is_some_and(|k| k.0 < id) {
-                    known.next();
-                }
-                known.peek().filter(|k| k.0 == id).map_or(u32::MAX, |k| *k.1)
-            });
-            self.hosts = guess.collect();
-            self.host_ids.clone_from(&p.id);
-        }
-        self.coupled.clear();
-        self.coupled.resize(p.len(), true);
+        let begin = Instant::now();
+        self.hosts.clear();
+        let guess = p.id.iter().map(|id| self.last_hosts.get(self.places.of(*id) as usize).copied());
+        self.hosts.extend(guess.map(|g| g.unwrap_or(NONE)));
         let lost =
             self.locator.locate(&self.mesh, &mut p.position, &mut self.hosts).err().unwrap_or_default();
         for Lost { index, position, near } in lost {
@@ -270,10 +301,17 @@ impl CouplingStep {
                 let near = near.map(|n| format!(" (nearest patch {n})")).unwrap_or_default();
                 return Err(StepError::Outside { id: p.id[index], position, near });
             }
-            self.coupled[index] = false;
-            self.hosts[index] = u32::MAX;
+            self.hosts[index] = NONE;
             self.facts.excluded += 1;
         }
+        let located = Instant::now();
+        self.order.update(self.mesh.len(), &p.id, &self.hosts);
+        let ids: Vec<i64> = self.order.list.iter().map(|i| p.id[*i as usize]).collect();
+        self.places.update(&ids);
+        self.last_hosts.clear();
+        self.last_hosts.extend(self.order.list.iter().map(|i| self.hosts[*i as usize]));
+        self.seconds.locate = (located - begin).as_secs_f64();
+        self.seconds.arrange = located.elapsed().as_secs_f64();
         Ok(())
     }
 
@@ -281,93 +319,120 @@ impl CouplingStep {
         if self.use_positive { &mut *self.positive } else { &mut *self.smoother }
     }
 
-    fn smooth(&mut self, lanes: &mut [Lanes]) {
-        let smoother = if self.use_positive { &mut self.positive } else { &mut self.smoother };
-        smoother.apply(lanes, &self.active);
+    /// `work` all zero, its active rows about to be written.
+    fn clean_work(&mut self) {
+        self.dirty.iter().for_each(|j| self.work[*j as usize] = [0.0; 8]);
+        self.dirty.clone_from(&self.active.rows);
     }
 
-    /// Stage 4 (pass a): ε_s in lane 0, ε_s U_s in lanes 1–3.
-    fn smooth_solids(&mut self, p: &Particles) {
-        let mut lanes = std::mem::take(&mut self.lanes);
-        lanes.fill([0.0; 8]);
-        self.weights.deposit(&self.mesh, &mut lanes, |i| {
+    fn smooth_work(&mut self) {
+        let smoother = if self.use_positive { &mut self.positive } else { &mut self.smoother };
+        smoother.apply(&mut self.work, &self.active);
+    }
+
+    /// Stage 4 (pass a): ε_s, ε_s U_s and, beside them, G of the last fluid velocity. False if an ε_s is negative.
+    fn solids(&mut self, p: &Particles) -> bool {
+        let begin = Instant::now();
+        self.clean_work();
+        let (mut volume, mut scale, mut momentum) = (Sum::default(), Sum::default(), [Sum::default(); 3]);
+        self.weights.deposit(&self.mesh, &self.order.list, &mut self.work, |i| {
             let (v, u) = (p.volume(i), p.velocity[i]);
+            volume.add(v);
+            scale.add(v * norm(u));
+            (0..3).for_each(|a| momentum[a].add(v * u[a]));
             [v, v * u[0], v * u[1], v * u[2], 0.0, 0.0, 0.0, 0.0]
         });
-        self.smooth(&mut lanes);
-        self.lanes = lanes;
-        let total = sum((0..p.len()).filter(|i| self.coupled[*i]).map(|i| p.volume(i)));
-        let found = sum(self.lanes.iter().zip(&self.mesh.volume).map(|(l, v)| l[0] * v));
-        self.facts.solid_volume_error = ratio((found - total).abs(), total);
-        let part = |i: usize| p.velocity[i].map(|u| p.volume(i) * u);
-        let total = sum3((0..p.len()).filter(|i| self.coupled[*i]).map(part));
-        let found =
-            sum3(self.lanes.iter().zip(&self.mesh.volume).map(|(l, v)| [l[1] * v, l[2] * v, l[3] * v]));
-        let scale = sum((0..p.len()).filter(|i| self.coupled[*i]).map(|i| norm(part(i))));
-        let gap = [0, 1, 2].map(|a| found[a] - total[a]);
-        self.facts.solid_momentum_error = ratio(norm(gap), scale);
-    }
-
-    /// ε from ε_s; the run stops where no fluid is left, unless capping was chosen.
-    fn voidage(&mut self, first: bool) -> Result<(), StepError> {
-        let floor = self.setup.voidage_min;
-        for (j, lane) in self.lanes.iter().enumerate() {
-            let mut e = 1.0 - lane[0];
-            self.facts.solid_fraction_max = self.facts.solid_fraction_max.max(lane[0]);
+        for j in self.active.rows.iter().map(|j| *j as usize) {
+            self.work[j][FLUID..FLUID + 3].copy_from_slice(&self.fluid_velocity[j]);
+        }
+        self.smooth_work();
+        let q = &mut self.sources;
+        for j in self.filled.drain(..).map(|j| j as usize) {
+            (q.voidage[j], q.solids_flux[j], q.sp[j], q.su[j]) = (1.0, [0.0; 3], 0.0, [0.0; 3]);
+        }
+        self.filled.clone_from(&self.active.rows);
+        let (mut found, mut flux) = (Sum::default(), [Sum::default(); 3]);
+        let (mut negative, floor) = (false, self.setup.voidage_min);
+        self.facts.solid_fraction_max = 0.0;
+        self.facts.capped_volume = 0.0;
+        for j in self.active.rows.iter().map(|j| *j as usize) {
+            let (l, v) = (&self.work[j], self.mesh.volume[j]);
+            negative |= l[0] < 0.0;
+            found.add(l[0] * v);
+            (0..3).for_each(|a| flux[a].add(l[1 + a] * v));
+            let fact = &mut self.facts;
+            fact.solid_fraction_max = fact.solid_fraction_max.max(l[0]);
+            let mut e = 1.0 - l[0];
             if e < floor && floor > 0.0 {
-                self.facts.capped_volume += (floor - e) * self.mesh.volume[j];
+                fact.capped_volume += (floor - e) * v;
                 e = floor;
             }
-            if e <= 0.0 || e.is_nan() {
+            q.voidage[j] = e;
+            q.solids_flux[j] = [l[1], l[2], l[3]];
+        }
+        let (total, scale) = (volume.value(), scale.value());
+        self.facts.solid_volume_error = ratio((found.value() - total).abs(), total);
+        let gap = [0, 1, 2].map(|a| flux[a].value() - momentum[a].value());
+        self.facts.solid_momentum_error = ratio(norm(gap), scale);
+        self.seconds.solids = begin.elapsed().as_secs_f64();
+        !negative
+    }
+
+    /// The run stops where no fluid is left, unless capping was chosen.
+    fn check_voidage(&self) -> Result<(), StepError> {
+        let bad = |j: &&u32| {
+            self.sources.voidage[**j as usize].is_nan() || self.sources.voidage[**j as usize] <= 0.0
+        };
+        match self.active.rows.iter().find(bad) {
+            None => Ok(()),
+            Some(j) => {
+                let j = *j as usize;
                 let (cell, centre) = (self.mesh.ids[j], self.mesh.centre[j]);
-                return Err(StepError::NoFluid { cell, centre, voidage: e });
+                Err(StepError::NoFluid { cell, centre, voidage: self.sources.voidage[j] })
             }
-            self.sources.voidage[j] = e;
-            self.sources.solids_flux[j] = [lane[1], lane[2], lane[3]];
         }
-        if first {
-            self.sources.voidage_old.clone_from(&self.sources.voidage);
-        }
-        Ok(())
     }
 
     /// Stages 5 to 7 (pass b): drag, prediction, Sp and Su. False if an Sp is negative.
     fn sources_of(&mut self, p: &Particles) -> bool {
-        self.predict(p);
-        let mut lanes = std::mem::take(&mut self.lanes_b);
-        lanes.fill([0.0; 8]);
-        let (predicted, period) = (&self.predicted, self.setup.period);
-        self.weights.deposit(&self.mesh, &mut lanes, |i| {
-            linearise(&predicted[i], p.velocity[i], p.ledger[i], period)
+        let begin = Instant::now();
+        self.predict(p, false);
+        let predicted = Instant::now();
+        self.seconds.forces = (predicted - begin).as_secs_f64();
+        self.clean_work();
+        let (q, period) = (&self.predicted, self.setup.period);
+        self.weights.deposit(&self.mesh, &self.order.list, &mut self.work, |i| {
+            linearise(&q[i], p.velocity[i], p.ledger[i], period)
         });
-        self.smooth(&mut lanes);
-        let positive = lanes.iter().all(|l| l[0] >= 0.0);
-        for (j, l) in lanes.iter().enumerate() {
+        self.smooth_work();
+        let mut positive = true;
+        for j in self.active.rows.iter().map(|j| *j as usize) {
+            let l = &self.work[j];
+            positive &= l[0] >= 0.0;
             self.sources.sp[j] = l[0];
             self.sources.su[j] = [l[1], l[2], l[3]];
         }
-        self.lanes_b = lanes;
+        self.seconds.sources = predicted.elapsed().as_secs_f64();
         positive
     }
 
-    /// Stages 5 and 6: K from the voidage at the particle and the fluid of the last step; C, B, d.
-    fn predict(&mut self, p: &Particles) {
+    /// Stages 5 and 6: K from the voidage at the particle and the fluid of the last step; C, B, d. In exchange 0
+    /// the fluid stands in `gathered`, else it was smoothed in pass a.
+    fn predict(&mut self, p: &Particles, first: bool) {
         let s = &self.setup;
         self.predicted.clear();
-        for i in 0..p.len() {
-            if !self.coupled[i] {
-                self.predicted.push(Predicted::default());
-                continue;
-            }
-            let voidage =
-                (1.0 - self.weights.gather(&self.lanes, i)[0]).max(s.voidage_min.max(f64::MIN_POSITIVE));
-            let g = self.weights.gather(&self.gathered, i);
-            let gathered = [g[0], g[1], g[2]];
+        self.predicted.resize(p.len(), Predicted::default());
+        for i in self.order.list.iter().map(|i| *i as usize) {
+            let l = self.weights.gather(&self.work, i);
+            let voidage = (1.0 - l[0]).max(s.voidage_min.max(f64::MIN_POSITIVE));
+            let g = if first { self.weights.gather(&self.gathered, i) } else { l };
+            let at = if first { 0 } else { FLUID };
+            let gathered = [g[at], g[at + 1], g[at + 2]];
             let host = self.hosts[i] as usize;
             let u = interpolate::fluid_velocity(
                 s.fluid_velocity,
                 &self.mesh,
-                &self.fluid,
+                &self.fluid_velocity,
                 host,
                 p.position[i],
                 gathered,
@@ -384,82 +449,94 @@ impl CouplingStep {
                 k /= voidage;
             }
             let defect = [0, 1, 2].map(|a| u[a] - gathered[a]);
-            self.predicted.push(Predicted::new(s.scheme, k, slip, defect));
+            self.predicted[i] = Predicted::new(s.scheme, k, slip, defect);
         }
     }
 
     /// Stage 9 (pass c): the new fluid smoothed by the same G, read at the particles; the impulse charged.
     pub fn after_fluid(&mut self, p: &Particles, fluid: &Fluid, first: bool) -> Result<(), StepError> {
+        let begin = Instant::now();
         self.take_fluid(fluid)?;
+        let gathered = Instant::now();
+        self.seconds.gather = (gathered - begin).as_secs_f64();
         if first {
             // no fluid step lies behind: K is computed with the fluid as it stands, nothing is charged
-            self.predict(p);
+            self.predict(p, true);
         }
         let s = &self.setup;
         let n = p.len();
         let d = &mut self.drive;
         d.drag_coefficient.clear();
-        d.velocity.clear();
-        d.force.clear();
-        d.charged.clear();
-        let mut external = Vec::with_capacity(n);
-        for i in 0..n {
-            if !self.coupled[i] {
-                d.drag_coefficient.push(0.0);
-                for list in [&mut d.velocity, &mut d.force, &mut d.charged] {
-                    list.push([0.0; 3]);
-                }
-                external.push([0.0; 3]);
-                continue;
-            }
+        d.drag_coefficient.resize(n, 0.0);
+        for list in [&mut d.velocity, &mut d.force, &mut d.charged] {
+            list.clear();
+            list.resize(n, [0.0; 3]);
+        }
+        let (mut scale, mut sums) = (Sum::default(), [[Sum::default(); 3]; 3]);
+        for i in self.order.list.iter().map(|i| *i as usize) {
             let (g, q, v) = (self.weights.gather(&self.gathered, i), &self.predicted[i], p.volume(i));
             let u = [0, 1, 2].map(|a| g[a] + q.defect[a]);
             let outer = [0, 1, 2].map(|a| -v * (s.density * s.archimedes[a] + s.mean_pressure_gradient[a]));
             let inner = if s.pressure_force { [3, 4, 5].map(|a| -v * g[a]) } else { [0.0; 3] };
             let force = [0, 1, 2].map(|a| inner[a] + outer[a]);
+            let slip = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
             let charged = if first {
                 [0.0; 3]
             } else {
-                [0, 1, 2]
-                    .map(|a| s.period * (q.implicit * (u[a] - p.velocity[i][a]) + q.explicit[a] + force[a]))
+                [0, 1, 2].map(|a| s.period * (q.implicit * slip[a] + q.explicit[a] + force[a]))
             };
-            d.drag_coefficient.push(q.drag_coefficient);
-            d.velocity.push(u);
-            d.force.push(force);
-            d.charged.push(charged);
-            external.push(if first { [0.0; 3] } else { outer.map(|x| s.period * x) });
+            let external = if first { [0.0; 3] } else { outer.map(|x| s.period * x) };
+            let ledger = p.ledger[i];
+            scale.add(norm([0, 1, 2].map(|a| charged[a] + ledger[a])));
+            for a in 0..3 {
+                sums[0][a].add(charged[a]);
+                sums[1][a].add(ledger[a]);
+                sums[2][a].add(external[a]);
+            }
+            d.drag_coefficient[i] = q.drag_coefficient;
+            d.velocity[i] = u;
+            d.force[i] = force;
+            d.charged[i] = charged;
         }
-        let given = |i: usize| [0, 1, 2].map(|a| d.charged[i][a] + p.ledger[i][a]);
-        self.books = Books {
-            charged: sum3(d.charged.iter().copied()),
-            old_ledger: sum3((0..n).filter(|i| self.coupled[*i]).map(|i| p.ledger[i])),
-            external: sum3(external),
-            scale: sum((0..n).map(|i| norm(given(i)))),
-            reaction: [0.0; 3],
-        };
+        let [charged, old_ledger, external] = sums.map(|s| s.map(Sum::value));
+        self.books = Books { charged, old_ledger, external, scale: scale.value(), reaction: [0.0; 3] };
+        self.seconds.drive = gathered.elapsed().as_secs_f64();
         Ok(())
     }
 
     fn take_fluid(&mut self, fluid: &Fluid) -> Result<(), StepError> {
-        for j in 0..self.mesh.ids.len() {
-            let u = fluid.velocity[j];
-            let grad = |field: &[[f64; 3]], a: usize| field.get(j).map_or(0.0, |v| v[a]);
-            let q = [0, 1, 2].map(|a| grad(&fluid.pressure_gradient, a) - grad(&fluid.stress_divergence, a));
-            self.fluid[j] = [u[0], u[1], u[2], q[0], q[1], q[2], 0.0, 0.0];
-            if let Some(a) = (0..6).find(|a| !self.fluid[j][*a].is_finite()) {
-                let what =
-                    if a < 3 { "the fluid velocity" } else { "the pressure gradient or stress divergence" };
-                return Err(StepError::NotFinite {
-                    what,
-                    cell: self.mesh.ids[j],
-                    centre: self.mesh.centre[j],
-                });
-            }
+        let grad = |field: &[[f64; 3]], j: usize| field.get(j).copied().unwrap_or_default();
+        let mut whole = true;
+        for (j, u) in fluid.velocity.iter().enumerate() {
+            let (p, t) = (grad(&fluid.pressure_gradient, j), grad(&fluid.stress_divergence, j));
+            // any NaN or infinity makes this NaN
+            let test = u.iter().chain(&p).chain(&t).map(|x| x * 0.0).sum::<f64>();
+            whole &= test == 0.0;
         }
-        let mut gathered = std::mem::take(&mut self.gathered);
-        gathered.clone_from(&self.fluid);
-        self.smooth(&mut gathered);
-        self.gathered = gathered;
+        if !whole {
+            return Err(self.not_finite(fluid));
+        }
+        self.fluid_velocity.clone_from(&fluid.velocity);
+        for j in self.active.rows.iter().map(|j| *j as usize) {
+            let u = fluid.velocity[j];
+            let (p, t) = (grad(&fluid.pressure_gradient, j), grad(&fluid.stress_divergence, j));
+            self.gathered[j] = [u[0], u[1], u[2], p[0] - t[0], p[1] - t[1], p[2] - t[2], 0.0, 0.0];
+        }
+        let smoother = if self.use_positive { &mut self.positive } else { &mut self.smoother };
+        smoother.apply(&mut self.gathered, &self.active);
         Ok(())
+    }
+
+    #[cold]
+    fn not_finite(&self, fluid: &Fluid) -> StepError {
+        let bad = |v: &[f64; 3]| !v.iter().all(|x| x.is_finite());
+        let fields = [
+            ("the fluid velocity", &fluid.velocity),
+            ("the pressure gradient", &fluid.pressure_gradient),
+            ("the stress divergence", &fluid.stress_divergence),
+        ];
+        let found = fields.iter().find_map(|(what, f)| f.iter().position(bad).map(|j| (*what, j)));
+        let (what, j) = found.unwrap_or(("the fluid", 0));
+        StepError::NotFinite { what, cell: self.mesh.ids[j], centre: self.mesh.centre[j] }
     }
 }

@@ -4,6 +4,7 @@
 mod common;
 
 use common::{Hex, P, cloud, message, random};
+use voidage::arrange::Places;
 use voidage::couple::receive_mesh;
 use voidage::interpolate::FluidVelocity;
 use voidage::locate::Locator;
@@ -231,7 +232,7 @@ fn exchange(
     let model_a = !setup.model_b;
     let mut step = CouplingStep::new(mesh, setup, Box::new(ParticleCentroid), g, positive);
     let frames: Vec<Frame> = messages.iter().map(|m| Frame::parse(m).unwrap()).collect();
-    let mut p = Particles::receive(&frames).unwrap();
+    let mut p = Particles::receive(&frames, &Places::default()).unwrap();
     step.before_fluid(&mut p, true).unwrap();
     step.after_fluid(&p, &f, true).unwrap();
     step.before_fluid(&mut p, false).unwrap();
@@ -252,7 +253,8 @@ fn exchange(
         let all = [[drag_coefficient[i]].as_slice(), &velocity[i], &force[i], &charged[i]].concat();
         (p.id[i], std::array::from_fn(|k| all[k].to_bits()))
     };
-    let drive = (0..p.len()).map(bits).collect();
+    let mut drive: Vec<_> = (0..p.len()).map(bits).collect();
+    drive.sort_unstable_by_key(|d: &(i64, _)| d.0);
     (step.sources.clone(), drive, error)
 }
 
@@ -306,7 +308,7 @@ fn a_cell_without_fluid_stops_the_step_with_advice() {
     );
     let big = P { id: 1, x: [0.031, 0.02, 0.02], v: [0.0; 3], r: 0.006, ledger: [0.0; 3] };
     let words = message(&[big]);
-    let mut p = Particles::receive(&[Frame::parse(&words).unwrap()]).unwrap();
+    let mut p = Particles::receive(&[Frame::parse(&words).unwrap()], &Places::default()).unwrap();
     let e = step.before_fluid(&mut p, true).unwrap_err().to_string();
     assert!(e.contains("raise smooth.bandwidth") && e.contains("cell "), "{e}");
     p.position[0] = [1.0, 1.0, 1.0];

@@ -22,11 +22,14 @@ pub struct Group {
     pub cwd: PathBuf,
     /// where its output goes
     pub log: PathBuf,
+    /// a log the program writes itself: mpirun may lose the last lines of a program that aborts
+    pub own_log: Option<PathBuf>,
 }
 
 struct Running {
     name: &'static str,
     log: PathBuf,
+    own_log: Option<PathBuf>,
     child: Child,
     status: Option<ExitStatus>,
 }
@@ -75,7 +78,13 @@ impl Groups {
                     }
                 });
             }
-            groups.list.push(Running { name: g.name, log: g.log.clone(), child, status: None });
+            groups.list.push(Running {
+                name: g.name,
+                log: g.log.clone(),
+                own_log: g.own_log.clone(),
+                child,
+                status: None,
+            });
         }
         groups.remember();
         Ok(groups)
@@ -132,7 +141,10 @@ impl Groups {
             Some(words) => words.to_string(),
             None => format!("{} {how}", g.name),
         };
-        let tail = std::fs::read_to_string(&g.log).unwrap_or_default();
+        let logs = g.own_log.iter().chain([&g.log]);
+        // not always UTF-8: LIGGGHTS may print freed memory behind its last message
+        let read = |l| String::from_utf8_lossy(&std::fs::read(l).unwrap_or_default()).into_owned();
+        let tail: String = logs.map(read).collect();
         let wanted = |l: &&str| {
             (l.contains("ERROR") || l.contains("rror:") || l.contains("voidage:")) && !l.contains("ORTE_")
         };
@@ -205,6 +217,7 @@ mod tests {
             command: ["sh", "-c", scripts[i]].map(String::from).to_vec(),
             cwd: folder.clone(),
             log: log(i),
+            own_log: None,
         };
         Groups::start(&[group(0), group(1)]).unwrap()
     }

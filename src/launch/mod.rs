@@ -80,6 +80,7 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<Outcome, String> {
     let home = companions()?;
     let logs = config.folder.join("logs");
     std::fs::create_dir_all(&logs).map_err(|e| format!("{}: {e}", logs.display()))?;
+    let _ = std::fs::remove_file(logs.join("liggghts.log")); // an old one must not explain a new failure
     for token in voidage_shm::janitor::clean_dead().map_err(|e| e.to_string())? {
         tracing::info!("removed what the dead run {token} left behind");
     }
@@ -128,8 +129,13 @@ fn start(
     if f.run.cfd_ranks > 1 {
         cfd.push("-parallel".into());
     }
-    let group =
-        |name, command, log: &str| Group { name, command, cwd: config.folder.clone(), log: logs.join(log) };
+    let group = |name, command, log: &str| Group {
+        name,
+        command,
+        cwd: config.folder.clone(),
+        log: logs.join(log),
+        own_log: (name == "dem").then(|| logs.join("liggghts.log")),
+    };
     let plan =
         [group("couple", couple, "couple.log"), group("dem", dem, "dem.log"), group("cfd", cfd, "cfd.log")];
     let mut groups = Groups::start(&plan)?;

@@ -4,19 +4,11 @@
 //! Reads positions (m), radii (m), host cells; writes weights with Σ_k m_ik = 1. Deposit and gather are adjoint.
 //! New mappings implement `Mapping` and join `all`. Does not know what is deposited.
 
-use crate::mesh::{Mesh, NONE};
-use crate::step::Lanes;
+mod weights;
 
-/// Weights of all particles: particle i goes to `cell[k]` by `weight[k]`, k from `start[i]` to `start[i+1]`.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Weights {
-    /// first entry of each particle; one more at the end
-    pub start: Vec<u32>,
-    /// cell slots
-    pub cell: Vec<u32>,
-    /// m_ik
-    pub weight: Vec<f64>,
-}
+pub use weights::Weights;
+
+use crate::mesh::Mesh;
 
 /// A way to distribute particles over cells.
 pub trait Mapping {
@@ -40,49 +32,13 @@ impl Mapping for ParticleCentroid {
     }
     fn weights(&self, _: &Mesh, _: &[[f64; 3]], _: &[f64], host: &[u32], out: &mut Weights) {
         out.start.clear();
-        out.cell.clear();
         out.weight.clear();
-        out.start.push(0);
-        for h in host {
-            if *h != NONE {
-                out.cell.push(*h);
-                out.weight.push(1.0);
-            }
-            out.start.push(out.cell.len() as u32);
-        }
+        out.cell.clear();
+        out.cell.extend_from_slice(host);
     }
 }
 
 /// All mappings.
 pub fn all() -> Vec<Box<dyn Mapping>> {
     vec![Box::new(ParticleCentroid)]
-}
-
-impl Weights {
-    fn entries(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let range = self.start[i] as usize..self.start[i + 1] as usize;
-        range.map(|k| (self.cell[k] as usize, self.weight[k]))
-    }
-    /// Adds Σ_i m_ik q_i / V_k to each cell, particle by particle in their (id) order.
-    pub fn deposit(&self, mesh: &Mesh, lanes: &mut [Lanes], quantity: impl Fn(usize) -> Lanes) {
-        for i in 0..self.start.len().saturating_sub(1) {
-            let q = quantity(i);
-            for (cell, m) in self.entries(i) {
-                let (to, share) = (&mut lanes[cell], m / mesh.volume[cell]);
-                (0..8).for_each(|a| to[a] += share * q[a]);
-            }
-        }
-    }
-    /// Σ_k m_ik φ_k of particle i.
-    pub fn gather(&self, lanes: &[Lanes], i: usize) -> Lanes {
-        let range = self.start[i] as usize..self.start[i + 1] as usize;
-        if range.len() == 1 && self.weight[range.start] == 1.0 {
-            return lanes[self.cell[range.start] as usize];
-        }
-        let mut sum = [0.0; 8];
-        for (cell, m) in self.entries(i) {
-            (0..8).for_each(|a| sum[a] += m * lanes[cell][a]);
-        }
-        sum
-    }
 }

@@ -17,21 +17,42 @@ use thiserror::Error;
 /// Slot number of "no cell".
 pub const NONE: u32 = u32::MAX;
 
-/// One side of a cell.
+/// One side of a cell; 40 bytes, since there are six per cell and every locate reads them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Side {
-    /// unit normal of the face; the same vector for both cells of a face
-    pub normal: [f64; 3],
-    /// normal · face centre, m
-    pub offset: f64,
-    /// +1: the normal points out of this cell, −1: into it
-    pub sign: f64,
+    /// unit normal out of this cell, and normal · face centre (m); seen from the other cell the same bits, negated
+    pub plane: [f64; 4],
     /// cell across, or `NONE` at a boundary
     pub across: u32,
-    /// boundary patch (index into `patch_names`), else `NONE`
-    pub patch: u32,
-    /// what to add to a position that leaves here (cyclic), m
-    pub shift: [f64; 3],
+    /// bit 31: the face's own normal points into this cell; the rest: boundary patch, or number of the shift
+    tag: u32,
+}
+
+const INWARD: u32 = 1 << 31;
+
+impl Side {
+    fn new(plane: [f64; 4], across: u32, inward: bool, number: u32) -> Self {
+        Self { plane, across, tag: number | if inward { INWARD } else { 0 } }
+    }
+    /// Distance of a point beyond this side, m; negative: towards the cell.
+    #[inline(always)]
+    pub fn beyond(&self, x: &[f64; 3]) -> f64 {
+        let p = &self.plane;
+        (p[0] * x[0] + p[1] * x[1] + p[2] * x[2]) - p[3]
+    }
+    /// Does the face's own normal, the same for both cells, point out of this one?
+    pub fn outward(&self) -> bool {
+        self.tag & INWARD == 0
+    }
+    /// Boundary patch (index into `patch_names`); only where `across` is `NONE`.
+    pub fn patch(&self) -> u32 {
+        self.tag & !INWARD
+    }
+    /// Leads through a cyclic?
+    #[inline(always)]
+    pub fn shifts(&self) -> bool {
+        self.across != NONE && self.tag & !INWARD != 0
+    }
 }
 
 /// A row entry of the Laplacian.
@@ -58,6 +79,8 @@ pub struct Mesh {
     pub side_start: Vec<u32>,
     /// sides of all cells
     pub sides: Vec<Side>,
+    /// what is added to a position that leaves through a side (cyclic), m; number 0: nothing
+    pub shifts: Vec<[f64; 3]>,
     /// first link of each slot in `links`; one more at the end
     pub link_start: Vec<u32>,
     /// Laplacian entries, by neighbour slot within a row
@@ -66,17 +89,28 @@ pub struct Mesh {
     pub patch_names: Vec<String>,
     /// lower and upper corner, m
     pub bounds: [[f64; 3]; 2],
-    /// points of each cell's faces, for output: unique points and face lists by slot
+    /// points and faces
     pub faces: Faces,
 }
 
-/// Face loops by cell, for writing the mesh out.
+/// Points and face loops, for writing the mesh out and for cutting cells.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Faces {
     /// unique points, m
     pub points: Vec<[f64; 3]>,
-    /// per slot: list of faces, each a list of point numbers
-    pub of_cell: Vec<Vec<Vec<u32>>>,
+    /// first corner of each face in `corners`; one more at the end
+    pub start: Vec<u32>,
+    /// point numbers
+    pub corners: Vec<u32>,
+    /// per side of the mesh: its face
+    pub of_side: Vec<u32>,
+}
+
+impl Faces {
+    /// Point numbers of a face.
+    pub fn corners(&self, face: u32) -> &[u32] {
+        &self.corners[self.start[face as usize] as usize..self.start[face as usize + 1] as usize]
+    }
 }
 
 impl Mesh {
@@ -91,6 +125,15 @@ impl Mesh {
     /// Sides of a cell.
     pub fn sides(&self, slot: usize) -> &[Side] {
         &self.sides[self.side_start[slot] as usize..self.side_start[slot + 1] as usize]
+    }
+    /// Point numbers of the faces of a cell, in the order of its sides.
+    pub fn loops(&self, slot: usize) -> impl Iterator<Item = &[u32]> {
+        let range = self.side_start[slot] as usize..self.side_start[slot + 1] as usize;
+        self.faces.of_side[range].iter().map(|f| self.faces.corners(*f))
+    }
+    /// What is added to a position that leaves through a side, m.
+    pub fn shift(&self, side: &Side) -> [f64; 3] {
+        if side.shifts() { self.shifts[side.patch() as usize] } else { [0.0; 3] }
     }
     /// Laplacian row of a cell.
     pub fn links(&self, slot: usize) -> &[Link] {

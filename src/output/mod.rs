@@ -50,7 +50,7 @@ impl Output {
                 ("momentum_exchange_coefficient", Data::Scalar(&q.sp)),
                 ("momentum_source", Data::Vector(&q.su)),
             ];
-            series.write(s.time, "vtu", |file| vtk::cells(file, &s.step.mesh.faces, &fields))?;
+            series.write(s.time, "vtu", |file| vtk::cells(file, &s.step.mesh, &fields))?;
         }
         if let Some(series) = &mut self.particles {
             let d = &s.step.drive;

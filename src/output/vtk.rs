@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! VTK XML files with appended raw data: .vtu (cells as polyhedra), .vtp (points), .pvd (time series).
 
-use crate::mesh::Faces;
+use crate::mesh::Mesh;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -95,40 +95,38 @@ impl Appended {
 }
 
 /// Cells with fields.
-pub fn cells(file: &mut dyn Write, mesh: &Faces, fields: &[(&str, Data)]) -> io::Result<()> {
+pub fn cells(file: &mut dyn Write, mesh: &Mesh, fields: &[(&str, Data)]) -> io::Result<()> {
     let mut a = Appended::default();
-    let n = mesh.of_cell.len();
-    let corners: Vec<Vec<u32>> = mesh
-        .of_cell
-        .iter()
-        .map(|faces| {
-            let mut c: Vec<u32> = faces.iter().flatten().copied().collect();
-            c.sort_unstable();
-            c.dedup();
-            c
-        })
-        .collect();
+    let n = mesh.len();
+    let corners = |slot| {
+        let mut c: Vec<u32> = mesh.loops(slot).flatten().copied().collect();
+        c.sort_unstable();
+        c.dedup();
+        c
+    };
     let offsets = |lengths: Vec<usize>| {
         lengths.into_iter().scan(0i64, |sum, l| {
             *sum += l as i64;
             Some(*sum)
         })
     };
-    let stream = |faces: &Vec<Vec<u32>>| 1 + faces.iter().map(|f| 1 + f.len()).sum::<usize>();
-    let mut body =
-        format!("<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{n}\">\n<Points>\n", mesh.points.len());
-    body += &a.floats("Points", &Data::Vector(&mesh.points));
+    let stream = |slot| 1 + mesh.loops(slot).map(|f| 1 + f.len()).sum::<usize>();
+    let points = &mesh.faces.points;
+    let mut body = format!("<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{n}\">\n<Points>\n", points.len());
+    body += &a.floats("Points", &Data::Vector(points));
     body += "</Points>\n<Cells>\n";
-    body += &a.integers("connectivity", corners.iter().flatten().map(|p| i64::from(*p)));
-    body += &a.integers("offsets", offsets(corners.iter().map(Vec::len).collect()));
+    body += &a.integers("connectivity", (0..n).flat_map(corners).map(i64::from));
+    body += &a.integers("offsets", offsets((0..n).map(|c| corners(c).len()).collect()));
     body += &a.array("types", "UInt8", 1, &vec![42; n]);
-    let faces = mesh.of_cell.iter().flat_map(|faces| {
-        let lists =
-            faces.iter().flat_map(|f| std::iter::once(f.len() as i64).chain(f.iter().map(|p| i64::from(*p))));
-        std::iter::once(faces.len() as i64).chain(lists)
+    let faces = (0..n).flat_map(|slot| {
+        let list = |f: &[u32]| {
+            std::iter::once(f.len() as i64).chain(f.iter().map(|p| i64::from(*p))).collect::<Vec<_>>()
+        };
+        std::iter::once(mesh.loops(slot).count() as i64)
+            .chain(mesh.loops(slot).flat_map(list).collect::<Vec<_>>())
     });
     body += &a.integers("faces", faces);
-    body += &a.integers("faceoffsets", offsets(mesh.of_cell.iter().map(stream).collect()));
+    body += &a.integers("faceoffsets", offsets((0..n).map(stream).collect()));
     body += "</Cells>\n<CellData>\n";
     for (name, data) in fields {
         body += &a.floats(name, data);

@@ -1,0 +1,6 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! `voidage bench`: what the coupling step costs and how exact it is, on scenes made here.
+
+pub mod scene;
+pub mod step;
+pub mod triad;
