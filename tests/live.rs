@@ -297,3 +297,19 @@ fn lines_after_run_are_executed_when_the_fluid_ends() {
         "{log}"
     );
 }
+
+#[test]
+fn added_mass_and_lift_keep_the_third_law() {
+    let s = Scratch::new("added-mass");
+    copy(&root().join("cases/settling"), &s.case());
+    edit(&s.case().join("fluid/system/controlDict"), "endTime 0.24;", "endTime 0.01;");
+    let set = ["forces.added_mass=0.5", "forces.lift=loth", "coupling.feedback=two-way"];
+    let (out, _) = finish(start(&s.case(), &set), Duration::from_secs(60));
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let rows = std::fs::read_to_string(s.case().join("monitor.csv")).unwrap();
+    let mut lines = rows.lines();
+    let column = lines.next().unwrap().split(',').position(|c| c.contains("action_reaction")).unwrap();
+    let errors: Vec<f64> = lines.map(|l| l.split(',').nth(column).unwrap().parse().unwrap_or(0.0)).collect();
+    assert!(errors.len() > 20 && errors.iter().any(|e| *e > 0.0), "{errors:?}");
+    assert!(errors.iter().all(|e| *e <= 1e-12), "{errors:?}");
+}

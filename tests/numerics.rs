@@ -208,6 +208,7 @@ fn setup(scheme: &str, fluid_velocity: FluidVelocity, model_b: bool) -> Setup {
         period: 1e-3,
         voidage_min: 0.0,
         exclude_outside: false,
+        extra: forces::Extra::default(),
     }
 }
 

@@ -5,8 +5,14 @@
 //! implements `DragLaw` in `drag/` and joins `drag::all`. Does not know cells, weights or schemes.
 
 pub mod drag;
+pub mod extra;
+pub mod history;
+pub mod lift;
+pub mod parcel;
+pub mod rotation;
 
 pub use drag::{DragOptions, all, build};
+pub use extra::Extra;
 
 /// What a drag law looks at; SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
