@@ -2,24 +2,25 @@
 //! Basset's history force with bounded memory: the kernel's tail as ten exponentials, updated in place.
 //!
 //! F = (3/2) d² ρ √(πν) ∫ g(τ)/√(t−τ) dτ, g = d(u−v)/dt. Reads the slip (m/s) at each exchange; state: last slip and
-//! ten vectors per particle, to be carried by the exchange. A step change is remembered within 5 % for 20 000 periods.
+//! ten vectors per particle, to be carried by the exchange. A step change is remembered within 4 % for 20 000 periods.
 //! Does not know particles' owners.
 
 use std::f64::consts::{E, PI};
 
 const TERMS: usize = 10;
-/// (a_i, t_i/t_win): √t_win K ≈ Σ a_i √(e/t_i) exp(−t/2t_i), van Hinsberg, ten Thije Boonkkamp & Clercx 2011, table 2.
+/// (a_i, t_i/Δt): √Δt K ≈ Σ a_i √(e/t_i) exp(−t/2t_iΔt); form, t_i and the first a_i of van Hinsberg, ten Thije
+/// Boonkkamp & Clercx 2011, J. Comput. Phys. 230, 1465; the others fitted for t ≤ 4e4 Δt, largest error 2.3 %.
 const TAIL: [(f64, f64); TERMS] = [
-    (0.234_774_813_125_86, 0.1),
-    (0.285_495_762_382_94, 0.3),
-    (0.284_794_167_182_55, 1.0),
-    (0.261_497_755_375_74, 3.0),
-    (0.320_562_005_119_38, 10.0),
-    (0.353_544_906_891_46, 40.0),
-    (0.396_359_044_969_21, 190.0),
-    (0.422_539_085_964_514, 1000.0),
-    (0.483_173_842_252_65, 6500.0),
-    (0.636_611_465_570_01, 50_000.0),
+    (0.234774813, 0.1),
+    (0.285495762, 0.3),
+    (0.284794167, 1.0),
+    (0.327727514, 3.0),
+    (0.223618587, 10.0),
+    (0.436672887, 40.0),
+    (0.325264121, 190.0),
+    (0.481518980, 1000.0),
+    (0.389857117, 6500.0),
+    (0.913355533, 50000.0),
 ];
 
 /// The memory of one particle.
@@ -72,7 +73,7 @@ mod tests {
             let t = n as f64 * dt;
             let exact = 2.0 / (t.sqrt() + (t - dt).max(0.0).sqrt());
             if n < 5 || n % 997 == 0 {
-                assert!((got[0] / exact - 1.0).abs() < 0.05, "{n}: {} {exact}", got[0]);
+                assert!((got[0] / exact - 1.0).abs() < 0.04, "{n}: {} {exact}", got[0]);
             }
             assert!((got[2] + 2.0 * got[0]).abs() < 1e-9 * got[0] && got[1] == 0.0);
         }

@@ -109,8 +109,8 @@ mod tests {
         // 1.615 μ d |u| √Re_G, Re_G = γ d²/ν, times Mei's factor at Re = 1e-5
         let expected = 1.615 * 2e-5 * 1e-4 * 1e-3 * (100.0 * 1e-8 / 1e-5f64).sqrt();
         let f = SaffmanMei.force(&s(1e-3));
-        let (re, beta) = (1e-2, 0.5 * 1e-4 * 100.0 / 1e-3f64);
-        let mei = (1.0 - 0.3314 * beta.sqrt()) * (-0.1 * re as f64).exp() + 0.3314 * beta.sqrt();
+        let (re, beta) = (1e-2f64, 0.5 * 1e-4 * 100.0 / 1e-3f64);
+        let mei = (1.0 - 0.3314 * beta.sqrt()) * (-0.1 * re).exp() + 0.3314 * beta.sqrt();
         assert!((f[1] / (expected * mei) - 1.0).abs() < 1e-12 && f[0] == 0.0 && f[2] == 0.0, "{f:?}");
         for lift in all() {
             assert!(lift.force(&s(1e-3))[1] > 0.0 && lift.force(&s(-1e-3))[1] < 0.0, "{}", lift.name());
