@@ -3,7 +3,7 @@
 //!
 //! F = (3/2) d² ρ √(πν) ∫ g(τ)/√(t−τ) dτ, g = d(u−v)/dt. Reads the slip (m/s) at each exchange; state: last slip and
 //! ten vectors per particle, to be carried by the exchange. A step change is remembered within 4 % for 20 000 periods.
-//! Does not know particles' owners.
+//! Does not know particles' owners. A law with its tests; no case can switch it on yet.
 
 use std::f64::consts::{E, PI};
 

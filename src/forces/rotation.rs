@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Torque of the fluid on a spinning sphere: T = K_ω (½ ∇ × U − ω), K_ω in N m s. Linear momentum is not touched.
+//! A law with its tests; no case can switch it on yet.
 
 use crate::sums::norm;
 use std::f64::consts::PI;
