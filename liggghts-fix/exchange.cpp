@@ -39,6 +39,7 @@ void FixVoidage::open()
   if (!link_) stop(voidage_last_error());
   interval_ = (int)setting("coupling.interval");
   explicit_limit_ = setting("dem.explicit_limit");
+  added_ = setting("dem.added_mass");
   constant_force_ = setting("dem.constant_force") != 0.0;
   check_settings();
 }

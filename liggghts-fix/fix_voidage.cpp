@@ -28,7 +28,7 @@ namespace LAMMPS_NS { namespace SignalHandler { extern bool request_quit; } }
 
 FixVoidage::FixVoidage(LAMMPS *lmp, int narg, char **arg)
   : Fix(lmp, narg, arg), link_(NULL), a_(NULL), first_step_(-1), exchange_(0), restored_(-1),
-    last_(false), interval_(1), explicit_limit_(0.2),
+    last_(false), interval_(1), explicit_limit_(0.2), added_(0.0),
     constant_force_(false), ended_(false), quit_(false), integrated_(0), frozen_(0)
 {
   check_host();
@@ -111,14 +111,19 @@ void FixVoidage::setup(int vflag)
 void FixVoidage::fluid_force(int i, double h, double *fd) const
 {
   const double *a = a_[i], *v = atom->v[i], *f = atom->f[i];
-  const double m = atom->rmass[i], kc = a[K], x = kc * update->dt / m;
   const bool moves = (atom->mask[i] & integrated_) && !(atom->mask[i] & frozen_);
+  const double r = atom->radius[i], m = atom->rmass[i], kc = a[K];
+  // (m + ma) dv/dt = all other forces, so light particles are stable
+  const double ma = moves ? added_ * 4.0 / 3.0 * M_PI * r * r * r : 0.0, x = kc * update->dt / (m + ma);
   if (x <= explicit_limit_ || !moves || constant_force_) {
-    for (int k = 0; k < 3; k++) fd[k] = kc * (a[U + k] - v[k]) + a[F + k];
+    for (int k = 0; k < 3; k++) {
+      fd[k] = kc * (a[U + k] - v[k]) + a[F + k];
+      if (ma > 0.0) fd[k] = m / (m + ma) * (f[k] + fd[k]) - f[k];
+    }
     return;
   }
   // exact relaxation over h towards u + (other forces)/K; exact at rest and at terminal velocity for any x
-  const double rate = -m / h * expm1(-kc * h / m);
+  const double rate = -m / h * expm1(-kc * h / (m + ma));
   for (int k = 0; k < 3; k++) {
     const double other = f[k] + a[F + k];
     fd[k] = rate * (a[U + k] + other / kc - v[k]) - f[k];

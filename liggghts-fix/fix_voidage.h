@@ -55,6 +55,7 @@ class FixVoidage : public Fix {
   bool last_;                  // that is the last exchange of the run
   int interval_;               // DEM steps between exchanges
   double explicit_limit_;      // largest K dt / m handled explicitly
+  double added_;               // C_a times fluid density (kg/m3): added mass per particle volume
   bool constant_force_;        // force of the exchange held over the interval
   bool ended_;                 // the coupler has ended the run: no fluid force any more
   bool quit_;                  // this `run` is being ended

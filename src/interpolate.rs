@@ -49,7 +49,7 @@ pub fn fluid_velocity(
 }
 
 /// Least-squares gradient of the velocity over the face neighbours; directions without neighbours get zero.
-fn gradient(mesh: &Mesh, fluid: &[[f64; 3]], host: usize) -> [[f64; 3]; 3] {
+pub fn gradient(mesh: &Mesh, fluid: &[[f64; 3]], host: usize) -> [[f64; 3]; 3] {
     let (mut m, mut b) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
     for side in mesh.sides(host).iter().filter(|s| s.across != crate::mesh::NONE) {
         let other = side.across as usize;

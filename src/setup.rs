@@ -18,8 +18,26 @@ pub fn setup(c: &Config) -> Result<Setup, String> {
     let unknown = |what: &str, name: &str| format!("{what} = \"{name}\" is not known");
     let archimedes = f.fluid.gravity_treatment == GravityTreatment::Archimedes;
     let model_a = f.coupling.model == Model::A;
+    let x = &f.forces;
+    let options = forces::DragOptions {
+        sphericity: x.sphericity,
+        switch_voidage: x.switch_voidage,
+        filter_diameter: x.filter_diameter,
+        filter_density: x.filter_density,
+        density: f.fluid.density,
+        kinematic_viscosity: f.fluid.kinematic_viscosity,
+        parcel_factor: 0.05,
+        ratio: f.dem.coarse_graining,
+    };
+    let stress = forces::parcel::ParticleStress {
+        pressure: x.particle_stress,
+        exponent: x.particle_stress_exponent,
+        close_packing: x.close_packing,
+        floor: 1e-7,
+    };
     Ok(Setup {
-        drag: forces::by_name(&f.forces.drag).ok_or_else(|| unknown("forces.drag", &f.forces.drag))?,
+        drag: forces::build(&f.forces.drag, &options)
+            .ok_or_else(|| unknown("forces.drag", &f.forces.drag))?,
         scheme: scheme::by_name(&f.coupling.scheme)
             .ok_or_else(|| unknown("coupling.scheme", &f.coupling.scheme))?,
         fluid_velocity: FluidVelocity::by_name(&f.interpolate.fluid_velocity)
@@ -34,6 +52,12 @@ pub fn setup(c: &Config) -> Result<Setup, String> {
         period: c.period(),
         voidage_min: f.limits.voidage_min,
         exclude_outside: f.limits.outside == "exclude",
+        extra: forces::Extra {
+            ratio: f.dem.coarse_graining,
+            lift: forces::lift::all().iter().copied().find(|l| l.name() == x.lift),
+            added_mass: x.added_mass,
+            stress: (x.particle_stress > 0.0).then_some(stress),
+        },
     })
 }
 
@@ -65,6 +89,7 @@ pub fn welcome(c: &Config, resume: Option<&State>) -> Welcome {
     set("dem.constant_force", yes(f.dem.force == InInterval::Constant));
     set("coupling.resumed", yes(resume.is_some()));
     set("coupling.first_exchange", resume.map_or(0.0, |s| s.exchange as f64));
+    set("dem.added_mass", f.forces.added_mass * f.fluid.density);
     set("coupling.interval", f64::from(f.coupling.interval));
     set("fluid.density", f.fluid.density);
     set("fluid.kinematic_viscosity", f.fluid.kinematic_viscosity);

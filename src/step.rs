@@ -8,7 +8,8 @@
 
 use crate::arrange::{Order, Places};
 use crate::balance::{Books, ratio};
-use crate::forces::{DragLaw, Slip};
+use crate::forces::extra::Flow;
+use crate::forces::{Around, DragLaw, Extra, Slip};
 use crate::interpolate::{self, FluidVelocity};
 use crate::linearise::{Predicted, linearise};
 use crate::locate::{Locator, Lost};
@@ -52,6 +53,8 @@ pub struct Setup {
     pub voidage_min: f64,
     /// leave particles outside the mesh out instead of stopping
     pub exclude_outside: bool,
+    /// forces beside these, and the coarse-graining ratio
+    pub extra: Extra,
 }
 
 /// Why a step cannot be done.
@@ -192,6 +195,10 @@ pub struct CouplingStep {
     /// rows where `sources` are not those of an empty cell
     filled: Vec<u32>,
     predicted: Vec<Predicted>,
+    /// explicit forces with a reaction (N), empty if there are none
+    extra: Vec<[f64; 3]>,
+    /// fluid velocity one step before the last, for the added mass
+    fluid_before: Vec<[f64; 3]>,
     /// Voidage and sources of this step.
     pub sources: Sources,
     /// Reply to the DEM.
@@ -237,6 +244,8 @@ impl CouplingStep {
             dirty: Vec::new(),
             filled: Vec::new(),
             predicted: Vec::new(),
+            extra: Vec::new(),
+            fluid_before: Vec::new(),
             sources: Sources {
                 voidage: vec![1.0; n],
                 voidage_old: vec![1.0; n],
@@ -334,12 +343,14 @@ impl CouplingStep {
         let begin = Instant::now();
         self.clean_work();
         let (mut volume, mut scale, mut momentum) = (Sum::default(), Sum::default(), [Sum::default(); 3]);
+        let around = self.setup.drag.looks_around();
         self.weights.deposit(&self.mesh, &self.order.list, &mut self.work, |i| {
             let (v, u) = (p.volume(i), p.velocity[i]);
             volume.add(v);
             scale.add(v * norm(u));
             (0..3).for_each(|a| momentum[a].add(v * u[a]));
-            [v, v * u[0], v * u[1], v * u[2], 0.0, 0.0, 0.0, 0.0]
+            let surface = if around { 0.5 * v / p.radius[i] } else { 0.0 };
+            [v, v * u[0], v * u[1], v * u[2], 0.0, 0.0, 0.0, surface]
         });
         for j in self.active.rows.iter().map(|j| *j as usize) {
             self.work[j][FLUID..FLUID + 3].copy_from_slice(&self.fluid_velocity[j]);
@@ -419,6 +430,8 @@ impl CouplingStep {
     /// the fluid stands in `gathered`, else it was smoothed in pass a.
     fn predict(&mut self, p: &Particles, first: bool) {
         let s = &self.setup;
+        let (around, ratio) = (s.drag.looks_around(), s.extra.ratio);
+        let parcel = ratio * ratio * ratio;
         self.predicted.clear();
         self.predicted.resize(p.len(), Predicted::default());
         for i in self.order.list.iter().map(|i| *i as usize) {
@@ -437,24 +450,58 @@ impl CouplingStep {
                 gathered,
             );
             let slip = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
-            let mut k = s.drag.drag_coefficient(&Slip {
-                diameter: 2.0 * p.radius[i],
+            let at = Slip {
+                diameter: 2.0 * p.radius[i] / ratio,
                 voidage,
                 speed: norm(slip),
                 kinematic_viscosity: s.kinematic_viscosity,
                 density: s.density,
-            });
+            };
+            let mut k = parcel
+                * if around {
+                    let (sauter_diameter, cell_volume) = (l[0] / (l[7] * ratio), self.mesh.volume[host]);
+                    s.drag.drag_coefficient_in(&at, &Around { sauter_diameter, cell_volume })
+                } else {
+                    s.drag.drag_coefficient(&at)
+                };
             if s.model_b {
                 k /= voidage;
             }
             let defect = [0, 1, 2].map(|a| u[a] - gathered[a]);
             self.predicted[i] = Predicted::new(s.scheme, k, slip, defect);
         }
+        if s.extra.forces() {
+            self.extra_forces(p);
+        }
+    }
+
+    /// Lift and added mass with the fluid of the last step: part of the predicted impulse and of what drives the
+    /// particle alike, so they leave nothing in the ledger.
+    fn extra_forces(&mut self, p: &Particles) {
+        let (s, u) = (&self.setup, &self.fluid_velocity);
+        self.extra.clear();
+        self.extra.resize(p.len(), [0.0; 3]);
+        let flow = Flow {
+            mesh: &self.mesh,
+            velocity: u,
+            before: &self.fluid_before,
+            period: s.period,
+            density: s.density,
+            kinematic_viscosity: s.kinematic_viscosity,
+        };
+        let slip = |i: usize| [0, 1, 2].map(|a| u[self.hosts[i] as usize][a] - p.velocity[i][a]);
+        s.extra.compute(&flow, &self.order.list, &self.hosts, &p.radius, slip, &mut self.extra);
+        for i in self.order.list.iter().map(|i| *i as usize) {
+            (0..3).for_each(|a| self.predicted[i].explicit[a] += self.extra[i][a]);
+        }
     }
 
     /// Stage 9 (pass c): the new fluid smoothed by the same G, read at the particles; the impulse charged.
     pub fn after_fluid(&mut self, p: &Particles, fluid: &Fluid, first: bool) -> Result<(), StepError> {
         let begin = Instant::now();
+        if self.setup.extra.added_mass > 0.0 && !first {
+            self.fluid_before.clone_from(&self.fluid_velocity);
+        }
         self.take_fluid(fluid)?;
         let gathered = Instant::now();
         self.seconds.gather = (gathered - begin).as_secs_f64();
@@ -471,11 +518,22 @@ impl CouplingStep {
             list.clear();
             list.resize(n, [0.0; 3]);
         }
+        let solid = |j: usize| 1.0 - self.sources.voidage[j];
+        let stress = s
+            .extra
+            .stress
+            .map(|t| (0..self.mesh.len()).map(|j| [t.stress(solid(j)), 0.0, 0.0]).collect::<Vec<_>>());
         let (mut scale, mut sums) = (Sum::default(), [[Sum::default(); 3]; 3]);
         for i in self.order.list.iter().map(|i| *i as usize) {
             let (g, q, v) = (self.weights.gather(&self.gathered, i), &self.predicted[i], p.volume(i));
             let u = [0, 1, 2].map(|a| g[a] + q.defect[a]);
-            let outer = [0, 1, 2].map(|a| -v * (s.density * s.archimedes[a] + s.mean_pressure_gradient[a]));
+            let mut outer =
+                [0, 1, 2].map(|a| -v * (s.density * s.archimedes[a] + s.mean_pressure_gradient[a]));
+            if let Some(tau) = &stress {
+                let host = self.hosts[i] as usize;
+                let f = Extra::stress_force(&self.mesh, tau, host, v, solid(host));
+                (0..3).for_each(|a| outer[a] += f[a]);
+            }
             let inner = if s.pressure_force { [3, 4, 5].map(|a| -v * g[a]) } else { [0.0; 3] };
             let force = [0, 1, 2].map(|a| inner[a] + outer[a]);
             let slip = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
@@ -494,7 +552,8 @@ impl CouplingStep {
             }
             d.drag_coefficient[i] = q.drag_coefficient;
             d.velocity[i] = u;
-            d.force[i] = force;
+            let extra = self.extra.get(i).copied().unwrap_or_default();
+            d.force[i] = [0, 1, 2].map(|a| force[a] + extra[a]);
             d.charged[i] = charged;
         }
         let [charged, old_ledger, external] = sums.map(|s| s.map(Sum::value));

@@ -297,3 +297,35 @@ fn lines_after_run_are_executed_when_the_fluid_ends() {
         "{log}"
     );
 }
+
+#[test]
+fn added_mass_and_lift_keep_the_third_law() {
+    let s = Scratch::new("added-mass");
+    copy(&root().join("cases/settling"), &s.case());
+    edit(&s.case().join("fluid/system/controlDict"), "endTime 0.24;", "endTime 0.01;");
+    let set = ["forces.added_mass=0.5", "forces.lift=loth", "coupling.feedback=two-way"];
+    let (out, _) = finish(start(&s.case(), &set), Duration::from_secs(60));
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let rows = std::fs::read_to_string(s.case().join("monitor.csv")).unwrap();
+    let mut lines = rows.lines();
+    let column = lines.next().unwrap().split(',').position(|c| c.contains("action_reaction")).unwrap();
+    let errors: Vec<f64> = lines.map(|l| l.split(',').nth(column).unwrap().parse().unwrap_or(0.0)).collect();
+    assert!(errors.len() > 20 && errors.iter().any(|e| *e > 0.0), "{errors:?}");
+    assert!(errors.iter().all(|e| *e <= 1e-12), "{errors:?}");
+}
+
+#[test]
+fn a_light_sphere_is_released_with_the_inertia_of_its_added_mass() {
+    let s = Scratch::new("light");
+    copy(&root().join("cases/settling"), &s.case());
+    edit(&s.case().join("fluid/system/controlDict"), "endTime 0.24;", "endTime 0.01;");
+    edit(&s.case().join("particles.in"), "density 3000", "density 5");
+    let set = ["forces.added_mass=0.5", "forces.drag=none", "coupling.feedback=one-way"];
+    let (out, _) = finish(start(&s.case(), &set), Duration::from_secs(60));
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let log = std::fs::read_to_string(s.case().join("logs/dem.log")).unwrap();
+    let line = log.lines().rfind(|l| l.starts_with("terminal velocity")).unwrap();
+    let rise = -line.split(' ').next_back().unwrap().parse::<f64>().unwrap();
+    // (m_f − m) g/(m + ½ m_f) for 0.01 s: 5·9.81/10
+    assert!((rise / (4.905 * 0.01) - 1.0).abs() < 1e-5, "{line}");
+}

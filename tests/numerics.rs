@@ -303,6 +303,7 @@ fn setup(scheme: &str, fluid_velocity: FluidVelocity, model_b: bool) -> Setup {
         period: 1e-3,
         voidage_min: 0.0,
         exclude_outside: false,
+        extra: forces::Extra::default(),
     }
 }
 
@@ -365,6 +366,33 @@ fn action_is_reaction_for_every_scheme_interpolation_and_model() {
                     assert!(sources.voidage.iter().all(|e| *e > 0.0 && *e <= 1.0));
                 }
             }
+        }
+    }
+}
+
+#[test]
+fn action_is_reaction_with_lift_added_mass_parcels_and_their_stress() {
+    for hex in meshes() {
+        let list = [message(&cloud(3000, SIZE, 4e-4))];
+        for drag in ["koch-hill", "beetstra-polydisperse"] {
+            let with = |extra| {
+                let drag = forces::by_name(drag).unwrap();
+                let plain = setup("conservative", FluidVelocity::Gather, false);
+                exchange(&hex, false, &list, Setup { drag, extra, ..plain })
+            };
+            let lift = Some(forces::lift::all()[1]);
+            let stress = Some(forces::parcel::ParticleStress {
+                pressure: 1.0,
+                exponent: 3.0,
+                close_packing: 0.63,
+                floor: 1e-7,
+            });
+            let plain = with(forces::Extra::default());
+            let all = with(forces::Extra { ratio: 2.0, lift, added_mass: 0.5, stress });
+            assert!(plain.2 < 1e-12 && all.2 < 1e-12, "{:e} {:e}", plain.2, all.2);
+            assert!(plain.1 != all.1 && plain.0.sp != all.0.sp && plain.0.voidage == all.0.voidage);
+            let one = with(forces::Extra { stress, ..forces::Extra::default() });
+            assert!(one.1 != plain.1 && one.0 == plain.0, "the stress acts on particles only");
         }
     }
 }

@@ -5,6 +5,7 @@
 //! the errors the step itself reports. Receiving and sending are not in it.
 
 use super::scene;
+use crate::forces::Extra;
 use crate::interpolate::FluidVelocity;
 use crate::map;
 use crate::particles::Particles;
@@ -82,6 +83,7 @@ pub fn setup(drag: &str) -> Result<Setup, String> {
         period: 2e-4,
         voidage_min: 0.0,
         exclude_outside: false,
+        extra: Extra::default(),
     })
 }
 

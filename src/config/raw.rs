@@ -123,6 +123,8 @@ pub struct Dem {
     pub time_step: f64,
     #[serde(default = "implicit")]
     pub force: InInterval,
+    #[serde(default = "one")]
+    pub coarse_graining: f64,
     #[serde(default)]
     pub variables: BTreeMap<String, String>,
 }
@@ -225,6 +227,21 @@ impl Default for Interpolate {
     }
 }
 
+fn one() -> f64 {
+    1.0
+}
+fn three() -> f64 {
+    3.0
+}
+fn switch_voidage() -> f64 {
+    0.8
+}
+fn close_packing() -> f64 {
+    0.63
+}
+fn none() -> String {
+    "none".into()
+}
 fn yes() -> bool {
     true
 }
@@ -239,6 +256,24 @@ pub struct Forces {
     pub pressure_gradient: bool,
     #[serde(default = "yes")]
     pub viscous_stress: bool,
+    #[serde(default = "one")]
+    pub sphericity: f64,
+    #[serde(default = "switch_voidage")]
+    pub switch_voidage: f64,
+    #[serde(default)]
+    pub filter_diameter: f64,
+    #[serde(default)]
+    pub filter_density: f64,
+    #[serde(default = "none")]
+    pub lift: String,
+    #[serde(default)]
+    pub added_mass: f64,
+    #[serde(default)]
+    pub particle_stress: f64,
+    #[serde(default = "three")]
+    pub particle_stress_exponent: f64,
+    #[serde(default = "close_packing")]
+    pub close_packing: f64,
 }
 
 /// Section `output`.
@@ -294,6 +329,7 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("dem.script", "", "-", "its input script"),
     ("dem.time_step", "s", "-", "must equal `timestep` of the script"),
     ("dem.force", "", "implicit", "implicit (K(u-v)+f in each DEM step) | constant"),
+    ("dem.coarse_graining", "", "1", "parcel diameter / primary diameter: drag of the primary x ratio^3"),
     ("dem.variables", "", "{}", "passed as -var name value"),
     ("coupling.interval", "DEM steps", "-", "fluid step = interval x dem.time_step"),
     ("coupling.scheme", "", "conservative", "conservative | explicit"),
@@ -319,10 +355,21 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
         "forces.drag",
         "",
         "-",
-        "stokes schiller-naumann di-felice gidaspow beetstra syamlal-obrien koch-hill wen-yu none",
+        "stokes schiller-naumann di-felice rong di-felice-tang di-felice-tang-cfdem gidaspow gidaspow-blended \
+         ergun-wen-yu ergun wen-yu beetstra beetstra-cpl beetstra-polydisperse beetstra-filtered koch-hill tenneti \
+         tenneti-nga2 tang syamlal-obrien no-correction none",
     ),
     ("forces.pressure_gradient", "", "true", "-V grad p on the particles (model A)"),
     ("forces.viscous_stress", "", "true", "V div tau on the particles (model A)"),
+    ("forces.sphericity", "", "1", "of the particles, in Ergun's part of gidaspow and ergun-wen-yu"),
+    ("forces.switch_voidage", "", "0.8", "gidaspow, ergun-wen-yu: Ergun up to it, Wen & Yu above"),
+    ("forces.filter_diameter", "m", "0", "beetstra-filtered: primary diameter of its terminal velocity"),
+    ("forces.filter_density", "kg/m3", "0", "beetstra-filtered: particle density of its terminal velocity"),
+    ("forces.lift", "", "none", "none | saffman-mei | loth"),
+    ("forces.added_mass", "", "0", "coefficient of the added mass, 0.5 for a sphere alone; 0: off"),
+    ("forces.particle_stress", "Pa", "0", "MP-PIC stress (Snider) for parcels without contacts; 0: off"),
+    ("forces.particle_stress_exponent", "", "3", "its exponent, 2 to 5"),
+    ("forces.close_packing", "", "0.63", "its solid fraction at close packing"),
     ("output.fields", "", "true", "cell fields for ParaView at the fluid's write times"),
     ("output.particles", "", "true", "particles for ParaView at the fluid's write times"),
     ("output.picture", "", "none", "none | x | y | z: animation of the particles seen along that axis"),
@@ -427,6 +474,8 @@ fn names(file: &CaseFile) -> Vec<Problem> {
         }
     };
     check("forces.drag", &file.forces.drag, forces::all().iter().map(|l| l.name()).collect());
+    let lifts = ["none"].into_iter().chain(forces::lift::all().iter().map(|l| l.name()));
+    check("forces.lift", &file.forces.lift, lifts.collect());
     check("coupling.scheme", &file.coupling.scheme, scheme::all().iter().map(|s| s.name()).collect());
     check("map.method", &file.map.method, map::all().iter().map(|m| m.name()).collect());
     check("smooth.method", &file.smooth.method, smooth::NAMES.to_vec());
