@@ -172,7 +172,8 @@ fn exchange(
     println!("mesh: {} cells of {} ranks", mesh.len(), session.cfd_ranks);
     let [smoother, positive] = setup::smoothers(config, &mesh)?;
     println!("smoothing: {}, {} sweeps", smoother.name(), smoother.degree());
-    let step = CouplingStep::new(mesh, setup::setup(config)?, setup::mapping(config)?, smoother, positive);
+    let mapping = setup::mapping(config, &mesh)?;
+    let step = CouplingStep::new(mesh, setup::setup(config)?, mapping, smoother, positive);
     let monitor = Monitor::create(&config.folder.join("monitor.csv"), false).map_err(|e| e.to_string())?;
     let steps = config.steps();
     let mut said: Option<Instant> = None;

@@ -14,6 +14,8 @@ struct Half {
     shift: V,
     /// the canonical area vector points out of this cell
     outward: bool,
+    /// corners, m
+    points: Vec<V>,
 }
 
 /// Joins the pieces of all CFD ranks (rank order) to the whole mesh.
@@ -22,15 +24,14 @@ pub fn assemble(pieces: &[MeshPiece]) -> Result<Mesh, MeshError> {
     let n = ids.len();
     let mut halves: Vec<Vec<Half>> = (0..n).map(|_| Vec::new()).collect();
     let mut patch_names: Vec<String> = Vec::new();
-    let mut loops: Vec<Vec<Vec<V>>> = vec![Vec::new(); n];
     for (rank, piece) in pieces.iter().enumerate() {
         let corner =
             |f: usize| -> Vec<V> { piece.face(f).iter().map(|p| piece.points[*p as usize]).collect() };
         let mut put =
             |cell: u32, face: Face, owner: bool, across: u32, patch: u32, shift: V, points: Vec<V>| {
                 let slot = slots[rank][cell as usize] as usize;
-                halves[slot].push(Half { face, across, patch, shift, outward: owner != face.reversed });
-                loops[slot].push(points);
+                let outward = owner != face.reversed;
+                halves[slot].push(Half { face, across, patch, shift, outward, points });
             };
         for f in 0..piece.neighbour.len() {
             let (points, owner, neighbour) = (corner(f), piece.owner[f], piece.neighbour[f]);
@@ -57,7 +58,7 @@ pub fn assemble(pieces: &[MeshPiece]) -> Result<Mesh, MeshError> {
     }
     sort_patches(&mut patch_names, &mut halves);
     let bounds = bounds(pieces);
-    build(ids, slots, halves, patch_names, bounds, loops)
+    build(ids, slots, halves, patch_names, bounds)
 }
 
 fn number_cells(pieces: &[MeshPiece]) -> Result<(Vec<i64>, Vec<Vec<u32>>), MeshError> {
@@ -147,7 +148,6 @@ fn build(
     mut halves: Vec<Vec<Half>>,
     patch_names: Vec<String>,
     bounds: [V; 2],
-    loops: Vec<Vec<Vec<V>>>,
 ) -> Result<Mesh, MeshError> {
     let n = ids.len();
     let (mut centre, mut volume) = (Vec::with_capacity(n), Vec::with_capacity(n));
@@ -201,7 +201,8 @@ fn build(
         side_start.push(sides.len() as u32);
         link_start.push(links.len() as u32);
     }
-    let faces = unique(loops);
+    // in the order of `sides`
+    let faces = unique(halves.into_iter().map(|list| list.into_iter().map(|h| h.points).collect()).collect());
     Ok(Mesh { ids, centre, volume, slots, side_start, sides, link_start, links, patch_names, bounds, faces })
 }
 

@@ -5,7 +5,7 @@
 //! each face (`join`) and the Laplacian's graph. The result is the same to the bit however the mesh is split:
 //! every face is computed from one canonical description, sums run in global-id order. Does not know particles.
 
-mod geometry;
+pub(crate) mod geometry;
 mod join;
 pub mod made;
 mod piece;
@@ -76,7 +76,7 @@ pub struct Mesh {
 pub struct Faces {
     /// unique points, m
     pub points: Vec<[f64; 3]>,
-    /// per slot: list of faces, each a list of point numbers
+    /// per slot: list of faces in the order of its sides, each a list of point numbers
     pub of_cell: Vec<Vec<Vec<u32>>>,
 }
 
