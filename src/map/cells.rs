@@ -156,21 +156,30 @@ impl Cells {
             })
         })
     }
-    /// Where the walk from `cell` towards x ends: the cell that holds it, or the last one before a wall. x comes
-    /// back shifted through the cyclic faces crossed.
+    /// Where the walk from `cell` towards x ends: the cell that holds it, or the last one before a wall; by mean
+    /// planes of faces. x comes back shifted through the cyclic faces crossed. Between warped faces the walk may
+    /// not settle: it then ends after some steps in one of the cells around the point.
     pub fn walk(&self, mesh: &Mesh, from: u32, x: &mut V) -> u32 {
         let mut cell = from;
-        for _ in 0..1000 {
+        let (mut before, mut steps) = (NONE, 0);
+        loop {
             let mut worst = (0.0, None);
-            for f in self.facets(cell) {
-                let out = f.plane[0] * x[0] + f.plane[1] * x[1] + f.plane[2] * x[2] - f.plane[3];
-                if f.across != NONE && out > worst.0 {
-                    worst = (out, Some(f));
+            for s in mesh.sides(cell as usize) {
+                let out = s.sign * (dot(s.normal, *x) - s.offset);
+                if s.across != NONE && out > worst.0 {
+                    worst = (out, Some(s));
                 }
             }
-            let Some(f) = worst.1 else { break };
-            cell = f.across;
-            *x = add(*x, mesh.sides[f.side as usize].shift);
+            let Some(s) = worst.1 else { break };
+            // to and fro across one warped face: the lower cell
+            if steps > 1000
+                || (s.across == before && s.shift == [0.0; 3] && self.warped(cell) && cell < before)
+            {
+                break;
+            }
+            (before, steps) = (cell, steps + 1);
+            cell = s.across;
+            *x = add(*x, s.shift);
         }
         cell
     }
