@@ -112,6 +112,10 @@ impl Cells {
     pub fn len(&self) -> usize {
         self.warped.len()
     }
+    /// No cell at all.
+    pub fn is_empty(&self) -> bool {
+        self.warped.is_empty()
+    }
     /// Number of points.
     pub fn points(&self) -> usize {
         self.points.len()

@@ -169,7 +169,8 @@ impl Mapping for DividedVolume {
     fn weights(&self, mesh: &Mesh, position: &[[f64; 3]], radius: &[f64], host: &[u32], out: &mut Weights) {
         assert_eq!(self.cells.len(), mesh.len(), "divided-volume: prepare() it for this mesh first");
         out.clear();
-        let (mut visited, mut next): (Vec<(u32, V)>, Vec<(u32, u32)>) = (Vec::new(), Vec::new());
+        let mut visited: Vec<(u32, V)> = Vec::new();
+        let mut next: Vec<(u32, u32)> = Vec::new();
         for ((x, r), h) in position.iter().zip(radius).zip(host) {
             if *h == NONE {
                 out.close();

@@ -13,7 +13,12 @@
 //! weights jump, with the same sum and first moment.
 //! Source: cloud in cell: Birdsall & Fuss 1969; this construction on polyhedra: own.
 //! Error: the deposit adds a variance, h²/12 per axis beyond a cell's own on a uniform block; `link_variance` gives
-//! it per face so that the smoother can leave it out of T.
+//! it per face. Measured (`examples/mappings.rs`, solid fraction against the particles' exact Gaussian, b/h from 0.7 to 4):
+//! on hexahedra 2.2 to 4.9 times less error than the particle centroid with T = b²/4 left alone, 1.6 to 3.5 times with
+//! T = b²/4 − variance/2, because the two-point Laplacian's kernel is too peaked and the deposit's spread
+//! offsets that; polyhedra 1.7 to 2.3 times; graded hexahedra 1.1 to 4.2 times (at b/h = 4 the Laplacian's own error
+//! on the grading rules). On tetrahedra of cubes (six each) the Laplacian is inconsistent, 10 % wrong whatever the
+//! deposit; the gain there is at most 1.5 times and at b/h ≤ 1 it can be a loss: corner weights reach some 24 cells.
 
 mod block;
 mod fan;
