@@ -33,7 +33,7 @@ fn cosines(mesh: &Mesh) -> Mesh {
 }
 
 /// exp(T L) of one field with T = b²/4 − variance/2 ≥ 0 on each link, by uniformization to 1e-10.
-fn smooth(given: &Mesh, bandwidth: f64, variance: &[f64], straight: bool, phi: &mut Vec<f64>) -> usize {
+fn smooth(given: &Mesh, bandwidth: f64, variance: &[f64], straight: bool, phi: &mut [f64]) -> usize {
     let turned;
     let mesh = if straight {
         turned = cosines(given);
@@ -52,7 +52,7 @@ fn smooth(given: &Mesh, bandwidth: f64, variance: &[f64], straight: bool, phi: &
         );
         clipped += (0..mesh.links(i).len()).filter(|k| t(first + k) == 0.0).count();
     }
-    let (mut now, mut log, mut sum, mut k) = (phi.clone(), -q, 0.0, 0.0);
+    let (mut now, mut log, mut sum, mut k) = (phi.to_vec(), -q, 0.0, 0.0);
     phi.iter_mut().for_each(|p| *p = 0.0);
     loop {
         let p = f64::exp(log);

@@ -307,7 +307,7 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
         "particle-centroid | satellite-points (29) | divided-volume (exact overlap) | linear | kernel (Gaussian of \
          smooth.bandwidth; with smooth.method = none) | two-grid",
     ),
-    ("map.grid", "m", "-", "two-grid: cell size of the coarse grid; 2 to 3 particle diameters"),
+    ("map.grid", "m", "0", "two-grid: cell size of the coarse grid; 2 to 3 particle diameters"),
     ("smooth.method", "", "chebyshev", "chebyshev | uniformization (positive by proof) | none"),
     ("smooth.bandwidth", "m", "-", "b of the Gaussian exp(-r2/b2); 4 to 6 particle diameters"),
     (

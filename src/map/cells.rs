@@ -9,7 +9,7 @@ use crate::mesh::{Mesh, NONE};
 /// A plane polygon of a cell's surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Facet {
-    /// outward unit normal and offset: n · x = plane[3] on the facet
+    /// outward unit normal and offset: n · x = offset on the facet
     pub plane: [f64; 4],
     /// cell across or `NONE`
     pub across: u32,
