@@ -249,7 +249,7 @@ fn around(mesh: &Mesh, cells: &Cells, point: u32, home: u32) -> Vec<(u32, V)> {
 /// (local maximum entropy), λ by Newton's method on the convex log Σ.
 fn entropy(d: &[V]) -> Vec<f64> {
     /// Larger: nearer cells count more.
-    const BETA: f64 = 1.0;
+    const BETA: f64 = 4.0;
     let s2 = d.iter().map(|x| dot(*x, *x)).sum::<f64>() / d.len() as f64;
     let s = s2.sqrt();
     let at = |lambda: V| -> (f64, Vec<f64>) {
