@@ -193,7 +193,8 @@ fn exchange(
     println!("mesh: {} cells of {} ranks", mesh.len(), session.cfd_ranks);
     let [smoother, positive] = setup::smoothers(config, &mesh)?;
     println!("smoothing: {}, {} sweeps", smoother.name(), smoother.degree());
-    let step = CouplingStep::new(mesh, setup::setup(config)?, setup::mapping(config)?, smoother, positive);
+    let mapping = setup::mapping(config, &mesh)?;
+    let step = CouplingStep::new(mesh, setup::setup(config)?, mapping, smoother, positive);
     let file = config.folder.join("monitor.csv");
     let monitor = match &resume {
         None => Monitor::create(&file, false),

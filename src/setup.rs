@@ -61,13 +61,13 @@ pub fn setup(c: &Config) -> Result<Setup, String> {
     })
 }
 
-/// The mapping by name.
-pub fn mapping(c: &Config) -> Result<Box<dyn Mapping>, String> {
+/// The mapping by name, ready for the mesh.
+pub fn mapping(c: &Config, mesh: &Mesh) -> Result<Box<dyn Mapping>, String> {
     let name = &c.file.map.method;
-    map::all()
-        .into_iter()
-        .find(|m| m.name() == name)
-        .ok_or_else(|| format!("map.method = \"{name}\" is not known"))
+    let found = map::all().into_iter().find(|m| m.name() == name);
+    let mut mapping = found.ok_or_else(|| format!("map.method = \"{name}\" is not known"))?;
+    mapping.prepare(mesh, &map::Options { bandwidth: c.file.smooth.bandwidth, grid: c.file.map.grid });
+    Ok(mapping)
 }
 
 /// The smoother asked for and the positive one for redone steps.

@@ -80,7 +80,10 @@ fn values(c: &Config, p: &mut Vec<Problem>) {
     if f.limits.voidage_min != 0.0 {
         range("limits.voidage_min", f.limits.voidage_min, 0.01, 0.99, "");
     }
-    if f.smooth.method != "none" {
+    if f.map.method == "two-grid" {
+        range("map.grid", f.map.grid, 1e-9, 1e3, "m");
+    }
+    if f.smooth.method != "none" || f.map.method == "kernel" {
         range("smooth.bandwidth", f.smooth.bandwidth, 1e-9, 1e3, "m");
     }
     for (key, n) in [("run.dem_ranks", f.run.dem_ranks), ("run.cfd_ranks", f.run.cfd_ranks)] {

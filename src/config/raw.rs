@@ -187,10 +187,11 @@ pub struct Coupling {
 #[allow(missing_docs)]
 pub struct Map {
     pub method: String,
+    pub grid: f64,
 }
 impl Default for Map {
     fn default() -> Self {
-        Self { method: "particle-centroid".into() }
+        Self { method: "particle-centroid".into(), grid: 0.0 }
     }
 }
 
@@ -336,7 +337,14 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("coupling.model", "", "A", "A | B: split of pressure gradient and stress"),
     ("coupling.feedback", "", "two-way", "two-way | one-way"),
     ("coupling.continuity", "", "voidage-rate", "voidage-rate (d eps/dt) | solids-flux (SX eq. 2a)"),
-    ("map.method", "", "particle-centroid", "particle-centroid"),
+    (
+        "map.method",
+        "",
+        "particle-centroid",
+        "particle-centroid | satellite-points (29) | divided-volume (exact overlap) | linear | kernel (Gaussian of \
+         smooth.bandwidth; with smooth.method = none) | two-grid",
+    ),
+    ("map.grid", "m", "0", "two-grid: cell size of the coarse grid; 2 to 3 particle diameters"),
     (
         "smooth.method",
         "",

@@ -4,11 +4,34 @@
 //! Reads positions (m), radii (m), host cells; writes weights with Σ_k m_ik = 1. Deposit and gather are adjoint.
 //! New mappings implement `Mapping` and join `all`. Does not know what is deposited.
 
+mod cells;
+mod divided;
+mod fill;
+mod kernel;
+mod linear;
+mod satellite;
+mod two_grid;
 mod weights;
+
+pub use cells::{Cells, Facet};
+pub use divided::DividedVolume;
+pub use kernel::Kernel;
+pub use linear::Linear;
+pub use satellite::SatellitePoints;
+pub use two_grid::TwoGrid;
 
 pub use weights::Weights;
 
 use crate::mesh::Mesh;
+
+/// What some mappings need to know.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Options {
+    /// b of `kernel`, m
+    pub bandwidth: f64,
+    /// cell size of the coarse grid of `two-grid`, m
+    pub grid: f64,
+}
 
 /// A way to distribute particles over cells.
 pub trait Mapping {
@@ -16,6 +39,15 @@ pub trait Mapping {
     fn name(&self) -> &'static str;
     /// Paper and equation.
     fn source(&self) -> &'static str;
+    /// What it keeps, its error and its cost.
+    fn properties(&self) -> &'static str;
+    /// Work done once per mesh; needed before `weights`.
+    fn prepare(&mut self, _mesh: &Mesh, _options: &Options) {}
+    /// Variance the deposit adds along each link beyond that of a cell of the mesh (m2, aligned with `mesh.links`, the same in both rows):
+    /// the smoother may take T = b²/4 − variance/2 there. Empty: none.
+    fn link_variance(&self, _mesh: &Mesh) -> Vec<f64> {
+        Vec::new()
+    }
     /// Fills `out`. A particle without host (`NONE`) gets no weight.
     fn weights(&self, mesh: &Mesh, position: &[[f64; 3]], radius: &[f64], host: &[u32], out: &mut Weights);
 }
@@ -30,6 +62,9 @@ impl Mapping for ParticleCentroid {
     fn source(&self) -> &'static str {
         "Sun & Xiao 2015, eq. 4"
     }
+    fn properties(&self) -> &'static str {
+        "conservative, positive, not continuous; first moment off by up to half a cell; costs nothing"
+    }
     fn weights(&self, _: &Mesh, _: &[[f64; 3]], _: &[f64], host: &[u32], out: &mut Weights) {
         out.start.clear();
         out.weight.clear();
@@ -40,5 +75,12 @@ impl Mapping for ParticleCentroid {
 
 /// All mappings.
 pub fn all() -> Vec<Box<dyn Mapping>> {
-    vec![Box::new(ParticleCentroid)]
+    vec![
+        Box::new(ParticleCentroid),
+        Box::<SatellitePoints>::default(),
+        Box::<DividedVolume>::default(),
+        Box::<Linear>::default(),
+        Box::<Kernel>::default(),
+        Box::<TwoGrid>::default(),
+    ]
 }

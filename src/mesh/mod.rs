@@ -5,7 +5,7 @@
 //! each face (`join`) and the Laplacian's graph. The result is the same to the bit however the mesh is split:
 //! every face is computed from one canonical description, sums run in global-id order. Does not know particles.
 
-mod geometry;
+pub(crate) mod geometry;
 mod join;
 pub mod made;
 mod piece;

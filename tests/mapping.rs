@@ -1,0 +1,409 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Every mapping on every kind of mesh: Σ m = 1, m ≥ 0, near walls, at cyclic faces and at rank borders; exact
+//! overlap against quadrature; moments of the linear deposit.
+
+mod common;
+
+use common::random;
+use voidage::arrange::Order;
+use voidage::locate::Locator;
+use voidage::map::{self, DividedVolume, Linear, Mapping, Options, SatellitePoints, Weights};
+use voidage::mesh::made::{Made, Shape};
+use voidage::mesh::{Mesh, NONE, assemble};
+use voidage::smooth::{self, Active, Diffusion, Direction, Scratch};
+
+const SIZE: [f64; 3] = [0.06, 0.04, 0.05];
+const OPTIONS: Options = Options { bandwidth: 0.012, grid: 0.017 };
+
+fn meshes() -> Vec<Made> {
+    let x = [true, false, false];
+    vec![
+        Made::hex([6, 4, 5], SIZE),
+        Made::hex([6, 4, 5], SIZE).cyclic([true; 3]),
+        Made::hex([6, 4, 5], SIZE).jiggled(0.3).cyclic(x),
+        Made::graded([6, 4, 5], SIZE).cyclic(x),
+        Made::tet([3, 2, 3], SIZE),
+        Made::tet([3, 2, 3], SIZE).cyclic([true, false, true]),
+        Made::poly([4, 3, 3], SIZE),
+        Made::poly([4, 3, 3], SIZE).cyclic(x),
+    ]
+}
+
+struct Cloud {
+    position: Vec<[f64; 3]>,
+    radius: Vec<f64>,
+    host: Vec<u32>,
+}
+
+/// Particles anywhere in the box, many near walls and cyclic faces; positions come back wrapped.
+fn cloud(mesh: &Mesh, n: usize, radius: f64) -> Cloud {
+    let mut seed = 11;
+    let mut position: Vec<[f64; 3]> = (0..n)
+        .map(|i| {
+            SIZE.map(|s| {
+                let t = random(&mut seed);
+                match i % 4 {
+                    0 => s * (1e-9 + 0.02 * t),
+                    1 => s * (1.0 - 1e-9 - 0.02 * t),
+                    _ => s * t,
+                }
+            })
+        })
+        .collect();
+    let mut host = vec![NONE; n];
+    Locator::new(mesh).locate(mesh, &mut position, &mut host).unwrap();
+    let radius = (0..n).map(|i| radius * (1.0 + (i % 3) as f64)).collect();
+    Cloud { position, radius, host }
+}
+
+fn weights(m: &dyn Mapping, mesh: &Mesh, c: &Cloud) -> Weights {
+    let mut w = Weights::default();
+    m.weights(mesh, &c.position, &c.radius, &c.host, &mut w);
+    w
+}
+
+fn of(w: &Weights, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+    (w.start[i] as usize..w.start[i + 1] as usize).map(|k| (w.cell[k] as usize, w.weight[k]))
+}
+
+#[test]
+fn weights_are_positive_and_sum_to_one() {
+    for made in meshes() {
+        let mesh = made.mesh();
+        for mut m in map::all() {
+            m.prepare(&mesh, &OPTIONS);
+            let n = if m.name() == "kernel" { 8 } else { 400 };
+            let mut c = cloud(&mesh, n, 0.003);
+            c.host[5] = NONE;
+            let w = weights(m.as_ref(), &mesh, &c);
+            assert_eq!(w.start.len(), n + 1, "{}", m.name());
+            assert_eq!(of(&w, 5).count(), 0, "{}: a particle without host", m.name());
+            for i in (0..n).filter(|i| *i != 5) {
+                let sum: f64 = of(&w, i).map(|e| e.1).sum();
+                assert!((sum - 1.0).abs() < 1e-14, "{} {made:?}: {sum}", m.name());
+                assert!(of(&w, i).all(|e| e.1 > 0.0 && e.0 < mesh.len()), "{} {made:?} {i}", m.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn rank_borders_do_not_show() {
+    for made in meshes() {
+        let mesh = made.mesh();
+        let cut = assemble(&made.pieces(2, |c| usize::from(c[0] + 0.3 * c[1] > 0.036))).unwrap();
+        for (mut a, mut b) in map::all().into_iter().zip(map::all()) {
+            a.prepare(&mesh, &OPTIONS);
+            b.prepare(&cut, &OPTIONS);
+            let c = cloud(&mesh, if a.name() == "kernel" { 8 } else { 300 }, 0.003);
+            let (w, v) = (weights(a.as_ref(), &mesh, &c), weights(b.as_ref(), &cut, &c));
+            assert_eq!(w, v, "{} {made:?}", a.name());
+            assert_eq!(a.link_variance(&mesh), b.link_variance(&cut), "{} {made:?}", a.name());
+        }
+    }
+}
+
+/// Area of the disc of radius r about the origin in a convex polygon.
+fn disc(polygon: &[[f64; 2]], r: f64) -> f64 {
+    let mut area = 0.0;
+    for i in 0..polygon.len() {
+        let (p, q) = (polygon[i], polygon[(i + 1) % polygon.len()]);
+        let u = [q[0] - p[0], q[1] - p[1]];
+        let size = u[0].hypot(u[1]);
+        if size == 0.0 {
+            continue;
+        }
+        let e = (p[0] * u[1] - p[1] * u[0]) / size;
+        let angle = |l: f64| l.atan2(e.abs());
+        let part = |l: f64| {
+            let cut = (r * r - e * e).max(0.0).sqrt().min(l.abs());
+            let a = e.abs() * cut + r * r * (angle(l.abs()) - angle(cut));
+            0.5 * a * l.signum()
+        };
+        let along = |p: [f64; 2]| (p[0] * u[0] + p[1] * u[1]) / size;
+        area += e.signum() * (part(along(q)) - part(along(p)));
+    }
+    area
+}
+
+/// Ball about x in the convex cell by slices across z: an independent way to the same number.
+fn slices(mesh: &Mesh, cell: usize, x: [f64; 3], r: f64) -> f64 {
+    let planes: Vec<([f64; 3], f64)> = mesh
+        .sides(cell)
+        .iter()
+        .map(|s| {
+            let n = [s.plane[0], s.plane[1], s.plane[2]];
+            (n, s.plane[3] - (n[0] * x[0] + n[1] * x[1] + n[2] * x[2]))
+        })
+        .collect();
+    let area = |z: f64| {
+        let b = 10.0 * r;
+        let mut polygon = vec![[-b, -b], [b, -b], [b, b], [-b, b]];
+        for (n, d) in &planes {
+            let s: Vec<f64> = polygon.iter().map(|p| n[0] * p[0] + n[1] * p[1] + n[2] * z - d).collect();
+            let mut next = Vec::new();
+            for i in 0..polygon.len() {
+                let j = (i + 1) % polygon.len();
+                if s[i] <= 0.0 {
+                    next.push(polygon[i]);
+                }
+                if (s[i] <= 0.0) != (s[j] <= 0.0) {
+                    let t = s[i] / (s[i] - s[j]);
+                    next.push([0, 1].map(|a| polygon[i][a] + t * (polygon[j][a] - polygon[i][a])));
+                }
+            }
+            polygon = next;
+        }
+        disc(&polygon, (r * r - z * z).max(0.0).sqrt())
+    };
+    // breaks where the slice changes shape: corners of the cell
+    let corners = mesh.loops(cell).flatten().map(|p| mesh.faces.points[*p as usize][2] - x[2]);
+    let mut at: Vec<f64> = corners.filter(|z| z.abs() < r).chain([-r, r]).collect();
+    // enough pieces that no small cap is missed
+    at.extend((1..64).map(|i| r * (i as f64 / 32.0 - 1.0)));
+    at.sort_by(f64::total_cmp);
+    fn gauss(f: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
+        const X: [f64; 5] = [
+            0.148_874_338_981_631_2,
+            0.433_395_394_129_247_2,
+            0.679_409_568_299_024_4,
+            0.865_063_366_688_984_5,
+            0.973_906_528_517_171_7,
+        ];
+        const W: [f64; 5] = [
+            0.295_524_224_714_752_9,
+            0.269_266_719_309_996_4,
+            0.219_086_362_515_982_04,
+            0.149_451_349_150_580_6,
+            0.066_671_344_308_688_14,
+        ];
+        let (m, h) = (0.5 * (a + b), 0.5 * (b - a));
+        (0..5).map(|i| W[i] * h * (f(m - h * X[i]) + f(m + h * X[i]))).sum()
+    }
+    fn adapt(f: &dyn Fn(f64) -> f64, a: f64, b: f64, whole: f64, tolerance: f64, depth: usize) -> f64 {
+        let m = 0.5 * (a + b);
+        let (l, r) = (gauss(f, a, m), gauss(f, m, b));
+        if depth == 0 || (l + r - whole).abs() < tolerance {
+            return l + r;
+        }
+        adapt(f, a, m, l, tolerance, depth - 1) + adapt(f, m, b, r, tolerance, depth - 1)
+    }
+    at.windows(2)
+        .filter(|w| w[1] > w[0])
+        .map(|w| adapt(&area, w[0], w[1], gauss(&area, w[0], w[1]), 1e-14 * r * r * r, 30))
+        .sum()
+}
+
+#[test]
+fn overlaps_are_exact() {
+    let mut worst = 0.0f64;
+    for made in [
+        Made::hex([6, 4, 5], SIZE),
+        Made::graded([6, 4, 5], SIZE),
+        Made::tet([3, 2, 3], SIZE),
+        Made::poly([4, 3, 3], SIZE),
+    ] {
+        let mesh = made.mesh();
+        let mut m = DividedVolume::default();
+        m.prepare(&mesh, &OPTIONS);
+        for radius in [0.001, 0.004] {
+            let c = cloud(&mesh, 40, radius);
+            let w = weights(&m, &mesh, &c);
+            for i in 0..c.host.len() {
+                let r = c.radius[i];
+                // through cells the mapping found and their neighbours: none may be missed
+                let mut list: Vec<usize> = of(&w, i).map(|e| e.0).collect();
+                list.extend(list.clone().iter().flat_map(|c| mesh.links(*c).iter().map(|l| l.to as usize)));
+                list.sort_unstable();
+                list.dedup();
+                let v: Vec<f64> = list.iter().map(|k| slices(&mesh, *k, c.position[i], r)).collect();
+                let all: f64 = v.iter().sum();
+                for (k, v) in list.iter().zip(&v) {
+                    let given: f64 = of(&w, i).filter(|e| e.0 == *k).map(|e| e.1).sum();
+                    worst = worst.max((given - v / all).abs());
+                    assert!(
+                        (given - v / all).abs() < 1e-10,
+                        "{made:?} particle {i} r {r} cell {k}: {given} {}",
+                        v / all
+                    );
+                }
+            }
+        }
+    }
+    println!("largest difference from quadrature: {worst:e}");
+}
+
+/// Free of walls the overlaps must fill the ball without being scaled, on warped cells too: a ball centred on
+/// corners, edges and faces of the mesh is the hardest.
+#[test]
+fn balls_on_corners_are_shared_evenly() {
+    let mesh = Made::hex([6, 4, 5], SIZE).cyclic([true; 3]).mesh();
+    let mut m = DividedVolume::default();
+    m.prepare(&mesh, &OPTIONS);
+    let corner = [SIZE[0] / 6.0 * 2.0, SIZE[1] / 4.0, SIZE[2] / 5.0 * 3.0];
+    let middle = [SIZE[0] / 6.0 * 2.5, SIZE[1] / 4.0, SIZE[2] / 5.0 * 3.0];
+    let mut c =
+        Cloud { position: vec![corner, middle, [0.0; 3]], radius: vec![0.002; 3], host: vec![NONE; 3] };
+    Locator::new(&mesh).locate(&mesh, &mut c.position, &mut c.host).unwrap();
+    let w = weights(&m, &mesh, &c);
+    for (i, n) in [(0, 8), (1, 4), (2, 8)] {
+        assert_eq!(of(&w, i).filter(|e| e.1 > 1e-5).count(), n, "{:?}", of(&w, i).collect::<Vec<_>>());
+        of(&w, i).for_each(|e| assert!(e.1 < 1e-5 || (e.1 - 1.0 / n as f64).abs() < 1e-6));
+    }
+}
+
+#[test]
+fn satellites_near_walls_stay_inside_and_follow_the_points() {
+    let mesh = Made::hex([6, 4, 5], SIZE).mesh();
+    let mut m = SatellitePoints::default();
+    m.prepare(&mesh, &OPTIONS);
+    let edge = SIZE[0] / 6.0;
+    let c = Cloud { position: vec![[edge + 1e-6, 0.005, 0.005]], radius: vec![0.002], host: vec![1] };
+    let w = weights(&m, &mesh, &c);
+    // left of the face: 8 points of the shells and the two on −x; the 9 with x = 0 lie 1e-6 right of it
+    let left: f64 = of(&w, 0).filter(|e| e.0 == 0).map(|e| e.1).sum();
+    assert!((left - 10.0 / 29.0).abs() < 1e-12, "{left}");
+}
+
+#[test]
+fn linear_keeps_the_first_moment() {
+    for made in [
+        Made::hex([6, 6, 6], SIZE),
+        Made::graded([6, 6, 6], SIZE),
+        Made::hex([6, 6, 6], SIZE).jiggled(0.3),
+        Made::tet([4, 4, 4], SIZE),
+        Made::poly([5, 5, 5], SIZE),
+    ] {
+        let mesh = made.mesh();
+        let mut m = Linear::default();
+        m.prepare(&mesh, &OPTIONS);
+        let c = cloud(&mesh, 2000, 0.001);
+        let w = weights(&m, &mesh, &c);
+        let (mut worst, mut mean, mut n, mut entries) = (0.0f64, 0.0, 0.0, 0);
+        for i in 0..c.host.len() {
+            // away from walls
+            if (0..3).any(|a| c.position[i][a] < 0.3 * SIZE[a] || c.position[i][a] > 0.7 * SIZE[a]) {
+                continue;
+            }
+            let h = mesh.volume[c.host[i] as usize].cbrt();
+            let error: f64 = (0..3)
+                .map(|a| of(&w, i).map(|(k, m)| m * mesh.centre[k][a]).sum::<f64>() - c.position[i][a])
+                .map(|e| e * e / (h * h))
+                .sum::<f64>()
+                .sqrt();
+            worst = worst.max(error);
+            mean += error;
+            n += 1.0;
+            entries += of(&w, i).count();
+        }
+        println!(
+            "{:?} jiggle {}: first moment off by {worst:.2e} h (mean {:.2e}), {:.1} cells",
+            made.shape,
+            made.jiggle,
+            mean / n,
+            entries as f64 / n
+        );
+        let allowed = if made.shape == Shape::Hex && made.jiggle == 0.0 { 1e-12 } else { 0.1 };
+        assert!(worst < allowed, "{made:?}: {worst}");
+    }
+}
+
+#[test]
+fn linear_is_continuous_across_faces() {
+    for made in [Made::hex([6, 4, 5], SIZE), Made::tet([3, 2, 3], SIZE), Made::poly([4, 3, 3], SIZE)] {
+        let mesh = made.mesh();
+        let mut m = Linear::default();
+        m.prepare(&mesh, &OPTIONS);
+        for cell in 0..mesh.len() {
+            for (side, face) in mesh.sides(cell).iter().zip(mesh.loops(cell)).filter(|s| s.0.across != NONE) {
+                let p: Vec<_> = face.iter().map(|p| mesh.faces.points[*p as usize]).collect();
+                let x = [0, 1, 2].map(|a| 0.5 * p[0][a] + 0.3 * p[1][a] + 0.2 * p[2][a]);
+                let c = Cloud {
+                    position: vec![x; 2],
+                    radius: vec![0.001; 2],
+                    host: vec![cell as u32, side.across],
+                };
+                let w = weights(&m, &mesh, &c);
+                for k in 0..mesh.len() {
+                    let of = |i| of(&w, i).filter(|e| e.0 == k).map(|e| e.1).sum::<f64>();
+                    assert!((of(0) - of(1)).abs() < 1e-9, "{made:?} cell {cell} face {face:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn link_variance_is_that_of_cloud_in_cell() {
+    let made = Made::hex([6, 4, 5], SIZE).cyclic([true, false, false]);
+    let mesh = made.mesh();
+    let mut m = Linear::default();
+    m.prepare(&mesh, &OPTIONS);
+    let variance = m.link_variance(&mesh);
+    assert_eq!(variance.len(), mesh.links.len());
+    for i in 0..mesh.len() {
+        for (k, l) in mesh.links(i).iter().enumerate() {
+            let j = l.to as usize;
+            let axis = if i.abs_diff(j) >= 24 {
+                2
+            } else if i.abs_diff(j) == 6 {
+                1
+            } else {
+                0
+            };
+            let h = SIZE[axis] / [6.0, 4.0, 5.0][axis];
+            let v = variance[mesh.link_start[i] as usize + k];
+            assert!((v - h * h / 12.0).abs() < 1e-12 * h * h, "{i} {j}: {v} {}", h * h / 12.0);
+        }
+    }
+    for made in meshes() {
+        let mesh = made.mesh();
+        let mut m = Linear::default();
+        m.prepare(&mesh, &OPTIONS);
+        let v = m.link_variance(&mesh);
+        for i in 0..mesh.len() {
+            for (k, l) in mesh.links(i).iter().enumerate() {
+                let at = mesh.link_start[i] as usize + k;
+                let j = l.to as usize;
+                let back = mesh.links(j).iter().enumerate().filter(|b| b.1.to as usize == i);
+                let same = back.map(|b| v[mesh.link_start[j] as usize + b.0]).any(|b| b == v[at]);
+                assert!(same, "{made:?} {i} {j}");
+            }
+        }
+    }
+}
+
+/// The reason for the linear deposit: at least twice closer to the particles' exact Gaussian on hexahedra.
+#[test]
+fn linear_halves_the_error_of_the_particle_centroid() {
+    let made = Made::hex([8; 3], [8.0; 3]);
+    let mesh = made.mesh();
+    let mut seed = 77;
+    let mut position: Vec<[f64; 3]> =
+        (0..100).map(|_| [0, 1, 2].map(|_| 8.0 * (0.001 + 0.6 * random(&mut seed)))).collect();
+    let mut host = vec![NONE; position.len()];
+    Locator::new(&mesh).locate(&mesh, &mut position, &mut host).unwrap();
+    let c = Cloud { radius: vec![0.1; position.len()], position, host };
+    for b in [1.0, 2.0] {
+        let field = |name: &str| {
+            let mut m = map::all().into_iter().find(|m| m.name() == name).unwrap();
+            m.prepare(&mesh, &Options { bandwidth: b, grid: 1.0 });
+            let mut lanes = vec![[0.0; 8]; mesh.len()];
+            let mut order = Order::default();
+            order.update(mesh.len(), &(0..c.host.len() as i64).collect::<Vec<_>>(), &c.host);
+            weights(m.as_ref(), &mesh, &c).deposit(&mesh, &order.list, &mut lanes, |_| [1.0; 8]);
+            if name != "kernel" {
+                let t = Diffusion::uniform(b).links(&mesh);
+                let mut s = smooth::by_name("uniformization", &mesh, &t, 1e-10).unwrap();
+                let all = Active::whole(mesh.len());
+                s.apply(&mut lanes, &all, Direction::Spread, &mut Scratch::default());
+            }
+            lanes
+        };
+        let exact = field("kernel");
+        let error =
+            |name| field(name).iter().zip(&exact).map(|(a, e)| f64::powi(a[0] - e[0], 2)).sum::<f64>().sqrt();
+        let (centroid, linear) = (error("particle-centroid"), error("linear"));
+        assert!(centroid > 2.0 * linear, "b/h = {b}: {centroid} {linear}");
+    }
+}
