@@ -35,7 +35,7 @@ class FixVoidage : public Fix {
  private:
   // columns of the per-atom table
   enum { K, U, F = U + 3, CHARGED = F + 3, TAKEN = CHARGED + 3, LEDGER = TAKEN + 3, FORCE = LEDGER + 3,
-         COLUMNS = FORCE + 3 };
+         LAST_V = FORCE + 3, COLUMNS = LAST_V + 3 };
 
   voidage_link *link_;
   double **a_;                 // per atom, COLUMNS wide
@@ -43,6 +43,7 @@ class FixVoidage : public Fix {
   bigint exchange_;            // number of the last exchange
   int interval_;               // DEM steps between exchanges
   double explicit_limit_;      // largest K dt / m handled explicitly
+  bool history_;               // the scheme wants to know the last interval
   bool constant_force_;        // force of the exchange held over the interval
   bool ended_;                 // the coupler has ended the run: no fluid force any more
   bool quit_;                  // this `run` is being ended
@@ -55,6 +56,7 @@ class FixVoidage : public Fix {
   void open();
   void exchange();
   void send();
+  void send_history();
   void receive();
   void fluid_force(int i, double h, double *fd) const;
   void stop(const char *);

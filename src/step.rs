@@ -14,7 +14,7 @@ use crate::locate::{Locator, Lost};
 use crate::map::{Mapping, Weights};
 use crate::mesh::Mesh;
 use crate::particles::Particles;
-use crate::scheme::Scheme;
+use crate::scheme::{Before, Cells, Scheme};
 use crate::smooth::{Active, Smoother};
 use crate::sums::{norm, sum, sum3};
 use thiserror::Error;
@@ -40,6 +40,10 @@ pub struct Setup {
     pub archimedes: [f64; 3],
     /// mean pressure gradient acting on particles (model A), Pa/m
     pub mean_pressure_gradient: [f64; 3],
+    /// acceleration of the particles' weight, m/s2: a known part of what moves them
+    pub gravity: [f64; 3],
+    /// ε_s U_s is formed each step: the fluid's continuity asks for it
+    pub solids_flux: bool,
     /// ρ_f, kg/m3
     pub density: f64,
     /// ν, m2/s
@@ -82,6 +86,12 @@ pub enum StepError {
         /// ε
         voidage: f64,
     },
+    /// The scheme needs what the DEM did not send.
+    #[error(
+        "coupling.scheme = \"{0}\" needs what the particles did in their last interval, and the DEM did not send it: \
+         build the fix anew (`./setup build`), or set coupling.scheme = \"conservative\""
+    )]
+    NoHistory(&'static str),
     /// A number that is not one.
     #[error(
         "{what} is not a finite number in cell {cell} (centre {centre:?} m): the fluid solver has gone wrong"
@@ -168,6 +178,8 @@ pub struct CouplingStep {
     predicted: Vec<Predicted>,
     lanes: Vec<Lanes>,
     lanes_b: Vec<Lanes>,
+    /// ε_s and ε_s U_s as mapped, for schemes that want them
+    mapped: Vec<Lanes>,
     use_positive: bool,
     /// Voidage and sources of this step.
     pub sources: Sources,
@@ -206,6 +218,7 @@ impl CouplingStep {
             predicted: Vec::new(),
             lanes: zero.clone(),
             lanes_b: zero,
+            mapped: Vec::new(),
             use_positive: false,
             sources: Sources {
                 voidage: vec![1.0; n],
@@ -229,6 +242,9 @@ impl CouplingStep {
     /// Stages 2 to 7. `first`: exchange 0, where there is no fluid step to come and nothing is charged.
     pub fn before_fluid(&mut self, p: &mut Particles, first: bool) -> Result<(), StepError> {
         self.facts = Facts { positive_redone: 0, excluded: 0, ..Facts::default() };
+        if self.setup.scheme.wants_history() && p.history.drag_coefficient.len() != p.len() {
+            return Err(StepError::NoHistory(self.setup.scheme.name()));
+        }
         self.locate(p)?;
         self.mapping.weights(&self.mesh, &p.position, &p.radius, &self.hosts, &mut self.weights);
         std::mem::swap(&mut self.sources.voidage, &mut self.sources.voidage_old);
@@ -288,17 +304,25 @@ impl CouplingStep {
 
     /// Stage 4 (pass a): ε_s in lane 0, ε_s U_s in lanes 1–3.
     fn smooth_solids(&mut self, p: &Particles) {
+        let scheme = self.setup.scheme;
+        let flux = self.setup.solids_flux || scheme.wants_solids();
         let mut lanes = std::mem::take(&mut self.lanes);
         lanes.fill([0.0; 8]);
         self.weights.deposit(&self.mesh, &mut lanes, |i| {
-            let (v, u) = (p.volume(i), p.velocity[i]);
+            let (v, u) = (p.volume(i), if flux { p.velocity[i] } else { [0.0; 3] });
             [v, v * u[0], v * u[1], v * u[2], 0.0, 0.0, 0.0, 0.0]
         });
+        if scheme.wants_solids() {
+            self.mapped.clone_from(&lanes);
+        }
         self.smooth(&mut lanes);
         self.lanes = lanes;
         let total = sum((0..p.len()).filter(|i| self.coupled[*i]).map(|i| p.volume(i)));
         let found = sum(self.lanes.iter().zip(&self.mesh.volume).map(|(l, v)| l[0] * v));
         self.facts.solid_volume_error = ratio((found - total).abs(), total);
+        if !flux {
+            return;
+        }
         let part = |i: usize| p.velocity[i].map(|u| p.volume(i) * u);
         let total = sum3((0..p.len()).filter(|i| self.coupled[*i]).map(part));
         let found =
@@ -336,16 +360,14 @@ impl CouplingStep {
         self.predict(p);
         let mut lanes = std::mem::take(&mut self.lanes_b);
         lanes.fill([0.0; 8]);
-        let (predicted, period) = (&self.predicted, self.setup.period);
-        self.weights.deposit(&self.mesh, &mut lanes, |i| {
-            linearise(&predicted[i], p.velocity[i], p.ledger[i], period)
-        });
+        let (predicted, period, scheme) = (&self.predicted, self.setup.period, self.setup.scheme);
+        let ledger = |i: usize| if scheme.conservative() { p.ledger[i] } else { [0.0; 3] };
+        self.weights
+            .deposit(&self.mesh, &mut lanes, |i| linearise(&predicted[i], p.velocity[i], ledger(i), period));
         self.smooth(&mut lanes);
-        let positive = lanes.iter().all(|l| l[0] >= 0.0);
-        for (j, l) in lanes.iter().enumerate() {
-            self.sources.sp[j] = l[0];
-            self.sources.su[j] = [l[1], l[2], l[3]];
-        }
+        let positive = lanes.iter().all(|l| l[0] >= 0.0 && l[4] >= 0.0);
+        let cells = Cells { smoothed: &lanes, solids: &self.lanes, mapped: &self.mapped, fluid: &self.fluid };
+        scheme.sources(&cells, &mut self.sources.sp, &mut self.sources.su);
         self.lanes_b = lanes;
         positive
     }
@@ -384,7 +406,10 @@ impl CouplingStep {
                 k /= voidage;
             }
             let defect = [0, 1, 2].map(|a| u[a] - gathered[a]);
-            self.predicted.push(Predicted::new(s.scheme, k, slip, defect));
+            let (v, inertia) = (p.velocity[i], p.mass[i]);
+            let last = p.history.last(i, v, inertia, s.gravity, s.period);
+            let before = Before { drag_coefficient: k, slip, inertia, period: s.period, last };
+            self.predicted.push(Predicted::new(s.scheme, &before, defect));
         }
     }
 
@@ -402,11 +427,15 @@ impl CouplingStep {
         d.velocity.clear();
         d.force.clear();
         d.charged.clear();
+        let conservative = s.scheme.conservative();
+        let ledger = |i: usize| if conservative { p.ledger[i] } else { [0.0; 3] };
         let mut external = Vec::with_capacity(n);
         for i in 0..n {
             if !self.coupled[i] {
                 d.drag_coefficient.push(0.0);
-                for list in [&mut d.velocity, &mut d.force, &mut d.charged] {
+                // its ledger waits until it is back: L = taken − charged
+                d.charged.push(ledger(i).map(|l| -l));
+                for list in [&mut d.velocity, &mut d.force] {
                     list.push([0.0; 3]);
                 }
                 external.push([0.0; 3]);
@@ -429,15 +458,39 @@ impl CouplingStep {
             d.charged.push(charged);
             external.push(if first { [0.0; 3] } else { outer.map(|x| s.period * x) });
         }
-        let given = |i: usize| [0, 1, 2].map(|a| d.charged[i][a] + p.ledger[i][a]);
+        let given = |i: usize| [0, 1, 2].map(|a| d.charged[i][a] + ledger(i)[a]);
         self.books = Books {
             charged: sum3(d.charged.iter().copied()),
-            old_ledger: sum3((0..n).filter(|i| self.coupled[*i]).map(|i| p.ledger[i])),
+            old_ledger: sum3((0..n).map(ledger)),
             external: sum3(external),
             scale: sum((0..n).map(|i| norm(given(i)))),
             reaction: [0.0; 3],
         };
         Ok(())
+    }
+
+    /// Forms ε_s U_s for output where no stage needs it.
+    pub fn form_solids_flux(&mut self, p: &Particles) {
+        if self.setup.solids_flux {
+            return;
+        }
+        let mut lanes = vec![[0.0; 8]; self.mesh.len()];
+        self.weights.deposit(&self.mesh, &mut lanes, |i| {
+            let (v, u) = (p.volume(i), p.velocity[i]);
+            [v * u[0], v * u[1], v * u[2], 0.0, 0.0, 0.0, 0.0, 0.0]
+        });
+        self.smooth(&mut lanes);
+        self.sources.solids_flux.iter_mut().zip(&lanes).for_each(|(s, l)| *s = [l[0], l[1], l[2]]);
+    }
+
+    /// The fluid asks for ε_s U_s.
+    pub fn wants_solids_flux(&self) -> bool {
+        self.setup.solids_flux
+    }
+
+    /// The scheme of this run keeps the third law by its ledger.
+    pub fn conservative(&self) -> bool {
+        self.setup.scheme.conservative()
     }
 
     fn take_fluid(&mut self, fluid: &Fluid) -> Result<(), StepError> {

@@ -202,6 +202,8 @@ fn setup(scheme: &str, fluid_velocity: FluidVelocity, model_b: bool) -> Setup {
         pressure_force: !model_b,
         archimedes: [0.0, 0.0, -9.81],
         mean_pressure_gradient: [0.0; 3],
+        gravity: [0.0, 0.0, -9.81],
+        solids_flux: true,
         density: 1.2,
         kinematic_viscosity: 1.5e-5,
         period: 1e-3,
@@ -260,7 +262,7 @@ fn exchange(
 fn action_is_reaction_for_every_scheme_interpolation_and_model() {
     for hex in meshes() {
         let list = [message(&cloud(3000, SIZE, 4e-4))];
-        for s in scheme::all() {
+        for s in scheme::all().iter().filter(|s| s.conservative()) {
             for how in [FluidVelocity::Gather, FluidVelocity::HostCell, FluidVelocity::Linear] {
                 for model_b in [false, true] {
                     let (sources, _, error) = exchange(&hex, false, &list, setup(s.name(), how, model_b));
