@@ -6,7 +6,7 @@
 //! second order (2 of half, minus 1 of whole); particle velocities are eliminated, leaving one dense system of the
 //! cells. Written from the equations alone: it shares mapping and smoothing with the step, nothing else.
 
-use super::bench::{held, mesh_of, random};
+use super::bench::{drive, held, mesh_of, random};
 use super::{BANDWIDTH, DENSITY, DIAMETER, Mode, PARTICLES, PERIOD, Point};
 use crate::locate::Locator;
 use crate::map::{Mapping, ParticleCentroid, Weights};
@@ -106,7 +106,7 @@ impl System {
             })
             .collect();
         let number = |j: usize| weight.iter().map(|w| w[j]).sum::<f64>();
-        let body = |j| if point.mode == Mode::Free { 0.0 } else { number(j) * k };
+        let body = |j| drive(point) * number(j) * k;
         let body = (0..mesh.len()).map(body).collect();
         let gravity = if settles { -k / mean } else { 0.0 };
         let u = if point.mode == Mode::Free { 1.0 } else { 0.0 };

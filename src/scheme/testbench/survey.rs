@@ -58,8 +58,8 @@ pub fn measure(point: Point, resolved: &Resolved) -> Outcome {
     let third = STEPS / 3;
     // growth: the last third against the middle one; a bounded forcing settles in far fewer steps or not at all
     let stable = list.len() == STEPS
-        && !(largest > 1e6)
-        && !(largest_of(&list[2 * third..]) > 3.0 * largest_of(&list[third..2 * third]).max(2.0));
+        && largest < 1e6
+        && largest_of(&list[2 * third..]) < 3.0 * largest_of(&list[third..2 * third]).max(2.0);
     let most = list.iter().map(|s| s.action).fold(0.0, f64::max);
     let errors = list.iter().skip(1).filter(|s| s.action > 1e-3 * most).map(|s| s.gap / s.action);
     let third_law = errors.fold(0.0, f64::max);
