@@ -7,6 +7,7 @@
 
 mod geometry;
 mod join;
+pub mod made;
 mod piece;
 
 pub use join::assemble;
