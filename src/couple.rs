@@ -320,7 +320,7 @@ impl<T: Transport> Exchange<'_, T> {
             solid_fraction_max: facts.solid_fraction_max,
             solid_volume_error: facts.solid_volume_error,
             solid_momentum_error: facts.solid_momentum_error,
-            action_reaction_error: self.two_way.then(|| books.error(None)),
+            action_reaction_error: (self.two_way && self.step.conservative()).then(|| books.error(None)),
             ledger_momentum: norm(books.old_ledger),
             positive_redone: summary.redone,
             excluded: summary.excluded,

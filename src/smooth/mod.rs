@@ -23,6 +23,10 @@ pub trait Smoother {
     fn name(&self) -> &'static str;
     /// What it keeps and its error, for the documentation.
     fn properties(&self) -> &'static str;
+    /// Conserves Σ V φ, keeps constants and is self-adjoint, all to rounding.
+    fn conservative(&self) -> bool {
+        true
+    }
     /// Number of sweeps over the mesh per application.
     fn degree(&self) -> usize;
     /// Smooths all lanes. Fields that are zero outside the occupied cells come out as from a sweep over the
