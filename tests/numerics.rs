@@ -325,3 +325,35 @@ fn the_mesh_comes_through_the_wire() {
     );
     assert!(receive_mesh(&mut none).is_err(), "no CFD rank, no mesh");
 }
+
+#[test]
+fn the_ledger_of_an_excluded_particle_waits() {
+    let mesh = assemble(&meshes()[0].whole()).unwrap();
+    let f = fluid(&mesh);
+    let none = || -> Box<dyn Smoother> { Box::new(Unsmoothed) };
+    let s = Setup { exclude_outside: true, ..setup("conservative", FluidVelocity::Gather, false) };
+    let mut step = CouplingStep::new(mesh, s, Box::new(ParticleCentroid), none(), none());
+    let ledger = [1e-6, -2e-6, 0.0];
+    let out = P { id: 1, x: [1.0; 3], v: [0.0; 3], r: 1e-4, ledger };
+    let words = message(&[out]);
+    let mut p = Particles::receive(&[Frame::parse(&words).unwrap()]).unwrap();
+    step.before_fluid(&mut p, false).unwrap();
+    step.after_fluid(&p, &f, false).unwrap();
+    // L = taken - charged, and nothing of it went to the fluid
+    assert_eq!(step.drive.charged[0].map(|c| -c), ledger);
+    assert!(step.sources.su.iter().flatten().all(|x| *x == 0.0));
+    assert_eq!(step.books.error(None), 0.0);
+}
+
+#[test]
+fn a_scheme_that_needs_the_last_interval_says_so() {
+    let mesh = assemble(&meshes()[0].whole()).unwrap();
+    let none = || -> Box<dyn Smoother> { Box::new(Unsmoothed) };
+    let s = setup("conservative-adaptive", FluidVelocity::Gather, false);
+    let mut step = CouplingStep::new(mesh, s, Box::new(ParticleCentroid), none(), none());
+    let words = message(&cloud(3, SIZE, 4e-4));
+    let mut p = Particles::receive(&[Frame::parse(&words).unwrap()]).unwrap();
+    p.history = voidage::scheme::History::default();
+    let e = step.before_fluid(&mut p, true).unwrap_err().to_string();
+    assert!(e.contains("conservative-adaptive") && e.contains("./setup build"), "{e}");
+}

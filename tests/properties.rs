@@ -158,7 +158,7 @@ fn exchange(mesh: &Mesh, p: &Particles, seed: u64) -> Result<(), TestCaseError> 
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 150, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn solids_momentum_and_third_law_close(mesh in meshes(), n in 0usize..40, seed in any::<u64>()) {
