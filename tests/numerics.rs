@@ -353,7 +353,7 @@ fn a_scheme_that_needs_the_last_interval_says_so() {
     let mut step = CouplingStep::new(mesh, s, Box::new(ParticleCentroid), none(), none());
     let words = message(&cloud(3, SIZE, 4e-4));
     let mut p = Particles::receive(&[Frame::parse(&words).unwrap()]).unwrap();
-    p.history = voidage::scheme::History::default();
+    p.history = scheme::History::default();
     let e = step.before_fluid(&mut p, true).unwrap_err().to_string();
     assert!(e.contains("conservative-adaptive") && e.contains("./setup build"), "{e}");
 }
