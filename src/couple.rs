@@ -348,7 +348,8 @@ impl<T: Transport> Exchange<'_, T> {
             let ledger = [0, 1, 2].map(kept);
             let charged = [0, 1, 2].map(|a| p.totals.taken[a] - ledger[a]);
             (0..3).for_each(|a| left[a] += ledger[a] - alive[a]);
-            if self.two_way {
+            // exchange 0 has no fluid step that could react
+            if self.two_way && (conservative || o.row.step > 0) {
                 o.row.action_reaction_error = Some(o.books.error(Some(charged)));
             }
             o.row.ledger_momentum = norm(alive);
