@@ -82,8 +82,8 @@ fn smooth(given: &Mesh, bandwidth: f64, variance: &[f64], straight: bool, phi: &
 fn deposit(mesh: &Mesh, w: &Weights, volume: &[f64]) -> Vec<f64> {
     let mut phi = vec![0.0; mesh.len()];
     for (i, v) in volume.iter().enumerate() {
-        for k in w.start[i] as usize..w.start[i + 1] as usize {
-            phi[w.cell[k] as usize] += w.weight[k] * v / mesh.volume[w.cell[k] as usize];
+        for (cell, m) in w.of(i) {
+            phi[cell] += m * v / mesh.volume[cell];
         }
     }
     phi

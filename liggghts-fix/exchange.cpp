@@ -41,6 +41,7 @@ void FixVoidage::open()
   explicit_limit_ = setting("dem.explicit_limit");
   added_ = setting("dem.added_mass");
   constant_force_ = setting("dem.constant_force") != 0.0;
+  history_ = setting("send.history") != 0.0;
   check_settings();
 }
 
@@ -58,9 +59,11 @@ void FixVoidage::send(bool settle)
     {VOIDAGE_ID, VOIDAGE_I64, n}, {VOIDAGE_TYPE, VOIDAGE_I64, n}, {VOIDAGE_POSITION, VOIDAGE_F64, 3 * n},
     {VOIDAGE_VELOCITY, VOIDAGE_F64, 3 * n}, {VOIDAGE_RADIUS, VOIDAGE_F64, n}, {VOIDAGE_MASS, VOIDAGE_F64, n},
     {VOIDAGE_ANGULAR_VELOCITY, VOIDAGE_F64, 3 * n}, {VOIDAGE_IMPULSE, VOIDAGE_F64, 3 * n},
-    {VOIDAGE_LEDGER, VOIDAGE_F64, 3 * n}, {VOIDAGE_TOTALS, VOIDAGE_F64, 9}};
-  if (voidage_begin(link_, VOIDAGE_PARTICLES, exchange_, update->ntimestep * update->dt, blocks,
-                    sizeof blocks / sizeof *blocks))
+    {VOIDAGE_LEDGER, VOIDAGE_F64, 3 * n}, {VOIDAGE_TOTALS, VOIDAGE_F64, 9},
+    {VOIDAGE_LAST_DRAG_COEFFICIENT, VOIDAGE_F64, n}, {VOIDAGE_LAST_DRIVE_VELOCITY, VOIDAGE_F64, 3 * n},
+    {VOIDAGE_LAST_FORCE, VOIDAGE_F64, 3 * n}, {VOIDAGE_LAST_VELOCITY, VOIDAGE_F64, 3 * n}};
+  const size_t count = sizeof blocks / sizeof *blocks - (history_ ? 0 : 4);
+  if (voidage_begin(link_, VOIDAGE_PARTICLES, exchange_, update->ntimestep * update->dt, blocks, count))
     stop(voidage_last_error());
   int64_t *id = (int64_t *)voidage_array(link_, VOIDAGE_ID), *type = (int64_t *)voidage_array(link_, VOIDAGE_TYPE);
   double *x = (double *)voidage_array(link_, VOIDAGE_POSITION), *v = (double *)voidage_array(link_, VOIDAGE_VELOCITY);
@@ -87,8 +90,29 @@ void FixVoidage::send(bool settle)
       a[TAKEN + k] = 0.0;
     }
   }
+  if (history_) send_history();
   memcpy(totals, totals_, sizeof totals_);
   if (voidage_send(link_)) stop(voidage_last_error());
+}
+
+// What drove the last interval and where it started from, for schemes that learn from it.
+void FixVoidage::send_history()
+{
+  double *kc = (double *)voidage_array(link_, VOIDAGE_LAST_DRAG_COEFFICIENT);
+  double *u = (double *)voidage_array(link_, VOIDAGE_LAST_DRIVE_VELOCITY);
+  double *f = (double *)voidage_array(link_, VOIDAGE_LAST_FORCE);
+  double *v = (double *)voidage_array(link_, VOIDAGE_LAST_VELOCITY);
+  if (!kc || !u || !f || !v) stop(voidage_last_error());
+  for (int i = 0; i < atom->nlocal; i++) {
+    double *a = a_[i];
+    kc[i] = a[K];
+    for (int k = 0; k < 3; k++) {
+      u[3 * i + k] = a[U + k];
+      f[3 * i + k] = a[F + k];
+      v[3 * i + k] = a[LAST_V + k];
+      a[LAST_V + k] = atom->v[i][k];
+    }
+  }
 }
 
 void FixVoidage::receive()

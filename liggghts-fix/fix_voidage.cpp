@@ -28,7 +28,7 @@ namespace LAMMPS_NS { namespace SignalHandler { extern bool request_quit; } }
 
 FixVoidage::FixVoidage(LAMMPS *lmp, int narg, char **arg)
   : Fix(lmp, narg, arg), link_(NULL), a_(NULL), first_step_(-1), exchange_(0), restored_(-1),
-    last_(false), interval_(1), explicit_limit_(0.2), added_(0.0),
+    last_(false), interval_(1), explicit_limit_(0.2), added_(0.0), history_(false),
     constant_force_(false), ended_(false), quit_(false), integrated_(0), frozen_(0)
 {
   check_host();

@@ -44,7 +44,7 @@ class FixVoidage : public Fix {
   // columns of the per-atom table
   enum { K, U, F = U + 3, CHARGED = F + 3, TAKEN = CHARGED + 3, LEDGER = TAKEN + 3, FORCE = LEDGER + 3,
          HELD = FORCE + 3,  // force and torque of all kinds when a restart file is written
-         COLUMNS = HELD + 6 };
+         LAST_V = HELD + 6, COLUMNS = LAST_V + 3 };
 
   voidage_link *link_;
   double **a_;                 // per atom, COLUMNS wide
@@ -56,6 +56,7 @@ class FixVoidage : public Fix {
   int interval_;               // DEM steps between exchanges
   double explicit_limit_;      // largest K dt / m handled explicitly
   double added_;               // C_a times fluid density (kg/m3): added mass per particle volume
+  bool history_;               // the scheme wants to know the last interval
   bool constant_force_;        // force of the exchange held over the interval
   bool ended_;                 // the coupler has ended the run: no fluid force any more
   bool quit_;                  // this `run` is being ended
@@ -68,6 +69,7 @@ class FixVoidage : public Fix {
   void open();
   void exchange();
   void send(bool settle);
+  void send_history();
   void receive();
   void resume(bigint first);
   void save();

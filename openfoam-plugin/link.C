@@ -161,7 +161,8 @@ const Sources& Link::receive()
     copy(VOIDAGE_VOIDAGE_OLD, sources_.voidageOld);
     copy(VOIDAGE_SP, sources_.sp);
     copy(VOIDAGE_SU, sources_.su);
-    copy(VOIDAGE_SOLIDS_FLUX, sources_.solidsFlux);
+    if (on("fluid.continuity")) copy(VOIDAGE_SOLIDS_FLUX, sources_.solidsFlux);
+    else sources_.solidsFlux = vectorField(mesh_.nCells(), vector::zero);
     voidage_release(link_);
     return sources_;
 }

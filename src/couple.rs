@@ -192,6 +192,7 @@ impl<T: Transport> Exchange<'_, T> {
                 self.send_drive(k, time, &particles, set.as_deref(), last)?;
             }
             if write {
+                self.step.form_solids_flux(&particles);
                 let snapshot = Snapshot { k, time, particles: &particles, step: &self.step, fluid: &fluid };
                 (self.write)(&snapshot)
                     .map_err(|source| CoupleError::File { what: "write fields", source })?;
@@ -357,7 +358,10 @@ impl<T: Transport> Exchange<'_, T> {
             let n = slots.len();
             let scalars =
                 [(field::VOIDAGE, &s.voidage), (field::VOIDAGE_OLD, &s.voidage_old), (field::SP, &s.sp)];
-            let vectors = [(field::SOLIDS_FLUX, &s.solids_flux), (field::SU, &s.su)];
+            let mut vectors = vec![(field::SU, &s.su)];
+            if self.step.wants_solids_flux() {
+                vectors.push((field::SOLIDS_FLUX, &s.solids_flux));
+            }
             let mut blocks: Vec<_> = scalars.iter().map(|f| Block::f64s(f.0, n)).collect();
             blocks.extend(vectors.iter().map(|f| Block::f64s(f.0, 3 * n)));
             let two_way = self.two_way;
@@ -443,7 +447,7 @@ impl<T: Transport> Exchange<'_, T> {
             solid_fraction_max: facts.solid_fraction_max,
             solid_volume_error: facts.solid_volume_error,
             solid_momentum_error: facts.solid_momentum_error,
-            action_reaction_error: self.two_way.then(|| books.error(None)),
+            action_reaction_error: (self.two_way && self.step.conservative()).then(|| books.error(None)),
             ledger_momentum: norm(books.old_ledger),
             positive_redone: summary.redone,
             excluded: summary.excluded,
@@ -464,11 +468,15 @@ impl<T: Transport> Exchange<'_, T> {
     ) -> Result<(), CoupleError> {
         if let Some(p) = next {
             // action = impulse applied + change of the ledger; vanished particles' ledger goes to `left`
-            let alive = crate::sums::sum3(p.ledger.iter().copied());
-            let ledger = [0, 1, 2].map(|a| p.totals.taken[a] - p.totals.charged[a]);
+            let conservative = self.step.conservative();
+            let alive = crate::sums::sum3(p.ledger.iter().copied().filter(|_| conservative));
+            // without a ledger the action is all that was taken, and the difference is the scheme's error
+            let kept = |a: usize| if conservative { p.totals.taken[a] - p.totals.charged[a] } else { 0.0 };
+            let ledger = [0, 1, 2].map(kept);
             let charged = [0, 1, 2].map(|a| p.totals.taken[a] - ledger[a]);
             (0..3).for_each(|a| left[a] += ledger[a] - alive[a]);
-            if self.two_way {
+            // exchange 0 has no fluid step that could react
+            if self.two_way && (conservative || o.row.step > 0) {
                 o.row.action_reaction_error = Some(o.books.error(Some(charged)));
             }
             o.row.ledger_momentum = norm(alive);

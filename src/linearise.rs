@@ -2,7 +2,7 @@
 //! Stage 7, linearise: from the prediction of one particle to its share of Sp and Su (design §2.2).
 //!
 //! Reads C (kg/s), B (N), d (m/s), v (m/s), L (N s); writes the eight lanes that are mapped and smoothed:
-//! lane 0 C, lanes 1–3 C (v − d) − B − L/Δt. Does not know weights or cells.
+//! lane 0 C, lanes 1–3 C (v − d) − B − L/Δt, lane 4 K. Does not know weights or cells.
 
 use crate::scheme::{Before, Scheme};
 
@@ -20,28 +20,33 @@ pub struct Predicted {
 }
 
 impl Predicted {
-    /// `slip` = u − v with the fluid of the last step, m/s.
-    pub fn new(scheme: &dyn Scheme, drag_coefficient: f64, slip: [f64; 3], defect: [f64; 3]) -> Self {
-        let (implicit, explicit) = scheme.predict(&Before { drag_coefficient, slip });
-        Self { drag_coefficient, implicit, explicit, defect }
+    /// What the scheme makes of `before`.
+    pub fn new(scheme: &dyn Scheme, before: &Before, defect: [f64; 3]) -> Self {
+        let (implicit, explicit) = scheme.predict(before);
+        Self { drag_coefficient: before.drag_coefficient, implicit, explicit, defect }
     }
 }
 
-/// Lanes of Sp (0, kg/s) and Su (1–3, N) of one particle; `period` Δt in s.
+/// Lanes of Sp (0, kg/s), Su (1–3, N) and K (4, kg/s) of one particle; `period` Δt in s.
 pub fn linearise(q: &Predicted, velocity: [f64; 3], ledger: [f64; 3], period: f64) -> [f64; 8] {
     let su = [0, 1, 2].map(|a| q.implicit * (velocity[a] - q.defect[a]) - q.explicit[a] - ledger[a] / period);
-    [q.implicit, su[0], su[1], su[2], 0.0, 0.0, 0.0, 0.0]
+    [q.implicit, su[0], su[1], su[2], q.drag_coefficient, 0.0, 0.0, 0.0]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scheme::Last;
 
     #[test]
     fn fluid_gets_back_what_the_particle_is_charged_and_the_old_ledger() {
         let (v, ledger, dt, u) = ([1.0, -2.0, 0.5], [1e-3, 0.0, -2e-3], 1e-2, [3.0, 0.1, 0.2]);
-        for scheme in crate::scheme::all() {
-            let q = Predicted::new(*scheme, 0.7, [2.0, 1.0, 0.0], [0.1, 0.2, 0.3]);
+        let last =
+            Last { drag_coefficient: 0.5, slip: [1.0, 2.0, 0.3], drag_impulse: [1e-3; 3], mobility: 0.3 };
+        for scheme in crate::scheme::all().iter().filter(|s| s.conservative()) {
+            let slip = [2.0, 1.0, 0.0];
+            let before = Before { drag_coefficient: 0.7, slip, inertia: 0.01, period: dt, last: Some(last) };
+            let q = Predicted::new(*scheme, &before, [0.1, 0.2, 0.3]);
             let s = linearise(&q, v, ledger, dt);
             for a in 0..3 {
                 let on_fluid = dt * (s[1 + a] - s[0] * u[a]);

@@ -6,6 +6,7 @@
 
 use crate::arrange::Places;
 use crate::mesh::NONE;
+use crate::scheme::History;
 use std::f64::consts::PI;
 use thiserror::Error;
 use voidage_wire::{Frame, WireError, field};
@@ -27,6 +28,8 @@ pub struct Particles {
     pub mass: Vec<f64>,
     /// N s, old ledger L: impulse taken but not yet charged to the fluid
     pub ledger: Vec<[f64; 3]>,
+    /// last interval, if the scheme wants it
+    pub history: History,
     /// N s, sums over all particles, those that vanished since included
     pub totals: Totals,
 }
@@ -104,7 +107,18 @@ impl Particles {
             (0..3).for_each(|a| totals.taken[a] += t[a]);
             (0..3).for_each(|a| totals.charged[a] += t[3 + a]);
         }
+        let mut history = History::default();
+        if History::in_frames(frames) {
+            history = History {
+                impulse: vectors(field::IMPULSE)?,
+                drag_coefficient: scalars(field::LAST_DRAG_COEFFICIENT)?,
+                drive: vectors(field::LAST_DRIVE_VELOCITY)?,
+                force: vectors(field::LAST_FORCE)?,
+                velocity: vectors(field::LAST_VELOCITY)?,
+            };
+        }
         let p = Self {
+            history,
             position: vectors(field::POSITION)?,
             velocity: vectors(field::VELOCITY)?,
             radius: scalars(field::RADIUS)?,
@@ -125,6 +139,7 @@ impl Particles {
                 () if !finite(&self.position[i]) => format!("position {:?}", self.position[i]),
                 () if !finite(&self.velocity[i]) => format!("velocity {:?}", self.velocity[i]),
                 () if !finite(&self.ledger[i]) => format!("ledger {:?}", self.ledger[i]),
+                () if self.history.wrong(i) => "its last interval is not a finite number".into(),
                 () if !(self.radius[i] > 0.0 && self.radius[i].is_finite()) => {
                     format!("radius {}", self.radius[i])
                 }

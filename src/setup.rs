@@ -47,6 +47,8 @@ pub fn setup(c: &Config) -> Result<Setup, String> {
         pressure_force: model_a && f.forces.pressure_gradient,
         archimedes: if archimedes { f.fluid.gravity } else { [0.0; 3] },
         mean_pressure_gradient: if model_a { f.fluid.mean_pressure_gradient } else { [0.0; 3] },
+        gravity: f.fluid.gravity,
+        solids_flux: f.coupling.continuity == crate::config::Continuity::SolidsFlux,
         density: f.fluid.density,
         kinematic_viscosity: f.fluid.kinematic_viscosity,
         period: c.period(),
@@ -104,7 +106,8 @@ pub fn welcome(c: &Config, resume: Option<&State>) -> Welcome {
         set(&format!("fluid.mean_pressure_gradient.{axis}"), f.fluid.mean_pressure_gradient[a]);
         set(&format!("fluid.gravity.{axis}"), if in_pressure { f.fluid.gravity[a] } else { 0.0 });
     }
-    // what no force needs is not sent
+    // what no force and no scheme needs is not sent
+    set("send.history", yes(scheme::by_name(&f.coupling.scheme).is_some_and(|s| s.wants_history())));
     set("send.pressure_gradient", yes(model_a && f.forces.pressure_gradient));
     set("send.stress_divergence", yes(model_a && f.forces.viscous_stress));
     w

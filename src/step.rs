@@ -16,7 +16,7 @@ use crate::locate::{Locator, Lost};
 use crate::map::{Mapping, Weights};
 use crate::mesh::{Mesh, NONE};
 use crate::particles::Particles;
-use crate::scheme::Scheme;
+use crate::scheme::{Before, Cells, Scheme};
 use crate::smooth::{Active, Direction, Field, Scratch, Smoother};
 use crate::sums::{Sum, norm};
 use std::time::Instant;
@@ -43,6 +43,10 @@ pub struct Setup {
     pub archimedes: [f64; 3],
     /// mean pressure gradient acting on particles (model A), Pa/m
     pub mean_pressure_gradient: [f64; 3],
+    /// acceleration of the particles' weight, m/s2: a known part of what moves them
+    pub gravity: [f64; 3],
+    /// ε_s U_s is formed each step: the fluid's continuity asks for it
+    pub solids_flux: bool,
     /// ρ_f, kg/m3
     pub density: f64,
     /// ν, m2/s
@@ -87,6 +91,12 @@ pub enum StepError {
         /// ε
         voidage: f64,
     },
+    /// The scheme needs what the DEM did not send.
+    #[error(
+        "coupling.scheme = \"{0}\" needs what the particles did in their last interval, and the DEM did not send it: \
+         build the fix anew (`./setup build`), or set coupling.scheme = \"conservative\""
+    )]
+    NoHistory(&'static str),
     /// A number that is not one.
     #[error(
         "{what} is not a finite number in cell {cell} (centre {centre:?} m): the fluid solver has gone wrong"
@@ -199,6 +209,9 @@ pub struct CouplingStep {
     extra: Vec<[f64; 3]>,
     /// fluid velocity one step before the last, for the added mass
     fluid_before: Vec<[f64; 3]>,
+    /// ε_s and ε_s U_s as mapped and as smoothed, for schemes that want them
+    mapped: Vec<Lanes>,
+    smoothed: Vec<Lanes>,
     /// Voidage and sources of this step.
     pub sources: Sources,
     /// Reply to the DEM.
@@ -246,6 +259,8 @@ impl CouplingStep {
             predicted: Vec::new(),
             extra: Vec::new(),
             fluid_before: Vec::new(),
+            mapped: Vec::new(),
+            smoothed: Vec::new(),
             sources: Sources {
                 voidage: vec![1.0; n],
                 voidage_old: vec![1.0; n],
@@ -276,6 +291,9 @@ impl CouplingStep {
     /// Stages 2 to 7. `first`: exchange 0, where there is no fluid step to come and nothing is charged.
     pub fn before_fluid(&mut self, p: &mut Particles, first: bool) -> Result<(), StepError> {
         self.facts = Facts::default();
+        if self.setup.scheme.wants_history() && p.history.drag_coefficient.len() != p.len() {
+            return Err(StepError::NoHistory(self.setup.scheme.name()));
+        }
         self.locate(p)?;
         let begin = Instant::now();
         self.mapping.weights(&self.mesh, &p.position, &p.radius, &self.hosts, &mut self.weights);
@@ -342,20 +360,28 @@ impl CouplingStep {
     fn solids(&mut self, p: &Particles) -> bool {
         let begin = Instant::now();
         self.clean_work();
+        let wanted = self.setup.scheme.wants_solids();
+        let with_flux = self.setup.solids_flux || wanted;
         let (mut volume, mut scale, mut momentum) = (Sum::default(), Sum::default(), [Sum::default(); 3]);
         let around = self.setup.drag.looks_around();
         self.weights.deposit(&self.mesh, &self.order.list, &mut self.work, |i| {
-            let (v, u) = (p.volume(i), p.velocity[i]);
+            let (v, u) = (p.volume(i), if with_flux { p.velocity[i] } else { [0.0; 3] });
             volume.add(v);
             scale.add(v * norm(u));
             (0..3).for_each(|a| momentum[a].add(v * u[a]));
             let surface = if around { 0.5 * v / p.radius[i] } else { 0.0 };
             [v, v * u[0], v * u[1], v * u[2], 0.0, 0.0, 0.0, surface]
         });
+        if wanted {
+            self.mapped = self.work.to_vec();
+        }
         for j in self.active.rows.iter().map(|j| *j as usize) {
             self.work[j][FLUID..FLUID + 3].copy_from_slice(&self.fluid_velocity[j]);
         }
         self.smooth_work(Direction::Both);
+        if wanted {
+            self.smoothed = self.work.to_vec();
+        }
         let q = &mut self.sources;
         for j in self.filled.drain(..).map(|j| j as usize) {
             (q.voidage[j], q.solids_flux[j], q.sp[j], q.su[j]) = (1.0, [0.0; 3], 0.0, [0.0; 3]);
@@ -410,17 +436,27 @@ impl CouplingStep {
         let predicted = Instant::now();
         self.seconds.forces = (predicted - begin).as_secs_f64();
         self.clean_work();
-        let (q, period) = (&self.predicted, self.setup.period);
+        let (q, period, scheme) = (&self.predicted, self.setup.period, self.setup.scheme);
+        let ledger = |i: usize| if scheme.conservative() { p.ledger[i] } else { [0.0; 3] };
         self.weights.deposit(&self.mesh, &self.order.list, &mut self.work, |i| {
-            linearise(&q[i], p.velocity[i], p.ledger[i], period)
+            linearise(&q[i], p.velocity[i], ledger(i), period)
         });
         self.smooth_work(Direction::Spread);
         let mut positive = true;
         for j in self.active.rows.iter().map(|j| *j as usize) {
             let l = &self.work[j];
-            positive &= l[0] >= 0.0;
+            positive &= l[0] >= 0.0 && l[4] >= 0.0;
             self.sources.sp[j] = l[0];
             self.sources.su[j] = [l[1], l[2], l[3]];
+        }
+        if !scheme.conservative() {
+            let cells = Cells {
+                smoothed: &self.work,
+                solids: &self.smoothed,
+                mapped: &self.mapped,
+                fluid: &self.fluid_velocity,
+            };
+            scheme.sources(&cells, &mut self.sources.sp, &mut self.sources.su);
         }
         self.seconds.sources = predicted.elapsed().as_secs_f64();
         positive
@@ -468,7 +504,10 @@ impl CouplingStep {
                 k /= voidage;
             }
             let defect = [0, 1, 2].map(|a| u[a] - gathered[a]);
-            self.predicted[i] = Predicted::new(s.scheme, k, slip, defect);
+            let (v, inertia) = (p.velocity[i], p.mass[i]);
+            let last = p.history.last(i, v, inertia, s.gravity, s.period);
+            let before = Before { drag_coefficient: k, slip, inertia, period: s.period, last };
+            self.predicted[i] = Predicted::new(s.scheme, &before, defect);
         }
         if s.extra.forces() {
             self.extra_forces(p);
@@ -523,6 +562,8 @@ impl CouplingStep {
             .extra
             .stress
             .map(|t| (0..self.mesh.len()).map(|j| [t.stress(solid(j)), 0.0, 0.0]).collect::<Vec<_>>());
+        let conservative = s.scheme.conservative();
+        let ledger = |i: usize| if conservative { p.ledger[i] } else { [0.0; 3] };
         let (mut scale, mut sums) = (Sum::default(), [[Sum::default(); 3]; 3]);
         for i in self.order.list.iter().map(|i| *i as usize) {
             let (g, q, v) = (self.weights.gather(&self.gathered, i), &self.predicted[i], p.volume(i));
@@ -543,11 +584,11 @@ impl CouplingStep {
                 [0, 1, 2].map(|a| s.period * (q.implicit * slip[a] + q.explicit[a] + force[a]))
             };
             let external = if first { [0.0; 3] } else { outer.map(|x| s.period * x) };
-            let ledger = p.ledger[i];
-            scale.add(norm([0, 1, 2].map(|a| charged[a] + ledger[a])));
+            let old = ledger(i);
+            scale.add(norm([0, 1, 2].map(|a| charged[a] + old[a])));
             for a in 0..3 {
                 sums[0][a].add(charged[a]);
-                sums[1][a].add(ledger[a]);
+                sums[1][a].add(old[a]);
                 sums[2][a].add(external[a]);
             }
             d.drag_coefficient[i] = q.drag_coefficient;
@@ -556,10 +597,43 @@ impl CouplingStep {
             d.force[i] = [0, 1, 2].map(|a| force[a] + extra[a]);
             d.charged[i] = charged;
         }
+        for i in (0..n).filter(|i| self.hosts[*i] == NONE) {
+            // its ledger waits until it is back: L = taken − charged
+            d.charged[i] = ledger(i).map(|l| -l);
+            for a in 0..3 {
+                sums[0][a].add(d.charged[i][a]);
+                sums[1][a].add(ledger(i)[a]);
+            }
+        }
         let [charged, old_ledger, external] = sums.map(|s| s.map(Sum::value));
         self.books = Books { charged, old_ledger, external, scale: scale.value(), reaction: [0.0; 3] };
         self.seconds.drive = gathered.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    /// Forms ε_s U_s for output where no stage needs it.
+    pub fn form_solids_flux(&mut self, p: &Particles) {
+        if self.setup.solids_flux {
+            return;
+        }
+        let mut lanes = vec![[0.0; 8]; self.mesh.len()];
+        self.weights.deposit(&self.mesh, &self.order.list, &mut lanes, |i| {
+            let (v, u) = (p.volume(i), p.velocity[i]);
+            [v * u[0], v * u[1], v * u[2], 0.0, 0.0, 0.0, 0.0, 0.0]
+        });
+        let smoother = if self.use_positive { &mut self.positive } else { &mut self.smoother };
+        smoother.apply(&mut lanes, &self.active, Direction::Spread, &mut self.scratch);
+        self.sources.solids_flux.iter_mut().zip(&lanes).for_each(|(s, l)| *s = [l[0], l[1], l[2]]);
+    }
+
+    /// The fluid asks for ε_s U_s.
+    pub fn wants_solids_flux(&self) -> bool {
+        self.setup.solids_flux
+    }
+
+    /// The scheme of this run keeps the third law by its ledger.
+    pub fn conservative(&self) -> bool {
+        self.setup.scheme.conservative()
     }
 
     fn take_fluid(&mut self, fluid: &Fluid) -> Result<(), StepError> {

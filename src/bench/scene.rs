@@ -4,7 +4,7 @@
 //! Writes a mesh of hexahedra, particles (SI units) and a smooth fluid field. All of it follows from the numbers
 //! given: no clock, no random device.
 
-use crate::mesh::{Mesh, MeshPiece, Patch, PatchKind, assemble};
+use crate::mesh::{Mesh, made::Made};
 use crate::particles::Particles;
 use crate::step::Fluid;
 
@@ -22,10 +22,10 @@ pub fn random(seed: &mut u64) -> f64 {
 }
 
 /// A mesh of about `cells` cubes in a box.
-pub fn mesh(size: [f64; 3], cells: usize) -> Result<Mesh, String> {
+pub fn mesh(size: [f64; 3], cells: usize) -> Mesh {
     let h = (size.iter().product::<f64>() / cells as f64).cbrt();
     let n = size.map(|s| ((s / h).round() as usize).max(1));
-    assemble(&[hex(n, size)]).map_err(|e| e.to_string())
+    Made::hex(n, size).mesh()
 }
 
 /// `n` spheres in a bed of `PACKING` on the bottom (y = 0): a lattice, every sphere pushed about by a third of its
@@ -68,84 +68,4 @@ pub fn air(mesh: &Mesh) -> Fluid {
         pressure_gradient: field(80.0, -6000.0),
         stress_divergence: field(90.0, 1.0),
     }
-}
-
-fn hex(n: [usize; 3], size: [f64; 3]) -> MeshPiece {
-    let m = n.map(|x| x + 1);
-    let point = |i: usize, j: usize, k: usize| ((k * m[1] + j) * m[0] + i) as u32;
-    let cell = |c: [usize; 3]| ((c[2] * n[1] + c[1]) * n[0] + c[0]) as u32;
-    let mut p = MeshPiece { face_starts: vec![0], ..MeshPiece::default() };
-    for k in 0..m[2] {
-        for j in 0..m[1] {
-            for i in 0..m[0] {
-                let at = [i, j, k];
-                p.points.push([0, 1, 2].map(|a| size[a] * at[a] as f64 / n[a] as f64));
-            }
-        }
-    }
-    p.cell_ids = (0..(n[0] * n[1] * n[2]) as i64).collect();
-    let face = |c: [usize; 3], axis: usize, high: bool| {
-        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        let mut l: Vec<u32> = [(0, 0), (1, 0), (1, 1), (0, 1)]
-            .iter()
-            .map(|(du, dv)| {
-                let mut q = c;
-                q[axis] += usize::from(high);
-                q[u] += du;
-                q[v] += dv;
-                point(q[0], q[1], q[2])
-            })
-            .collect();
-        if !high {
-            l.reverse();
-        }
-        l
-    };
-    let each = |f: &mut dyn FnMut([usize; 3])| {
-        for k in 0..n[2] {
-            for j in 0..n[1] {
-                for i in 0..n[0] {
-                    f([i, j, k])
-                }
-            }
-        }
-    };
-    let mut owner = Vec::new();
-    let mut neighbour = Vec::new();
-    each(&mut |c| {
-        for axis in 0..3 {
-            let mut d = c;
-            d[axis] += 1;
-            if d[axis] < n[axis] {
-                p.face_points.extend(face(c, axis, true));
-                p.face_starts.push(p.face_points.len() as u32);
-                owner.push(cell(c));
-                neighbour.push(cell(d));
-            }
-        }
-    });
-    let start = owner.len();
-    each(&mut |c| {
-        for axis in 0..3 {
-            for high in [false, true] {
-                if c[axis] == if high { n[axis] - 1 } else { 0 } {
-                    p.face_points.extend(face(c, axis, high));
-                    p.face_starts.push(p.face_points.len() as u32);
-                    owner.push(cell(c));
-                }
-            }
-        }
-    });
-    p.patches.push(Patch {
-        kind: PatchKind::Boundary,
-        name: "walls".into(),
-        start,
-        size: owner.len() - start,
-        neighbour_rank: 0,
-        neighbour_patch: 0,
-        separation: [0.0; 3],
-    });
-    p.owner = owner;
-    p.neighbour = neighbour;
-    p
 }

@@ -92,7 +92,7 @@ pub fn fields(mesh: &Mesh, filled: f64) -> Result<(Field, Vec<u32>), String> {
 
 /// Measures the default smoother and these others.
 pub fn run(case: &Case, others: &[&str]) -> Result<Numbers, String> {
-    let mesh = scene::mesh(scene::BOX, case.cells)?;
+    let mesh = scene::mesh(scene::BOX, case.cells);
     let (raw, occupied) = fields(&mesh, case.filled)?;
     let h = mesh.volume[0].cbrt();
     let t = Diffusion::uniform(case.width * h).links(&mesh);

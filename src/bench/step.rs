@@ -78,6 +78,8 @@ pub fn setup(drag: &str) -> Result<Setup, String> {
         pressure_force: true,
         archimedes: [0.0, -9.81, 0.0],
         mean_pressure_gradient: [0.0; 3],
+        gravity: [0.0, -9.81, 0.0],
+        solids_flux: false,
         density: 1.2,
         kinematic_viscosity: 1.5e-5,
         period: 2e-4,
@@ -89,10 +91,11 @@ pub fn setup(drag: &str) -> Result<Setup, String> {
 
 /// Runs the step once to warm up, then `repetitions` times; particles move a little in between, as in a bed.
 pub fn run(case: &Case) -> Result<Cost, String> {
-    let mesh = scene::mesh(scene::BOX, case.cells)?;
+    let mesh = scene::mesh(scene::BOX, case.cells);
     let fluid = scene::air(&mesh);
     let mapping = map::all().into_iter().find(|m| m.name() == case.mapping);
-    let mapping = mapping.ok_or_else(|| format!("mapping {} is not known", case.mapping))?;
+    let mut mapping = mapping.ok_or_else(|| format!("mapping {} is not known", case.mapping))?;
+    mapping.prepare(&mesh, &map::Options { bandwidth: case.bandwidth, grid: 2.4 * scene::DIAMETER });
     let t = smooth::Diffusion::uniform(case.bandwidth).links(&mesh);
     let graph = std::sync::Arc::new(smooth::Graph::new(&mesh, &t));
     let smoother = |name| smooth::on(name, &mesh, &t, &graph, case.tolerance).ok_or("no smoother");
@@ -152,5 +155,6 @@ fn placed(p: &Particles, step: &CouplingStep) -> Particles {
         radius: order.iter().map(|i| p.radius[*i]).collect(),
         mass: order.iter().map(|i| p.mass[*i]).collect(),
         totals: p.totals,
+        history: p.history.clone(),
     }
 }

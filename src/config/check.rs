@@ -165,6 +165,15 @@ fn models(c: &Config, p: &mut Vec<Problem>) {
             "dem.force = \"implicit\"",
         ));
     }
+    let scheme = crate::scheme::by_name(&f.coupling.scheme);
+    if two_way && scheme.is_some_and(|s| !s.conservative()) {
+        p.push(Problem::warning(
+            "coupling.scheme",
+            &f.coupling.scheme,
+            "it has no ledger and breaks the third law (monitor.csv: action_reaction_error; docs/schemes.md)",
+            "coupling.scheme = \"conservative\"",
+        ));
+    }
     if f.dem.force == InInterval::Constant {
         let accepted = "a constant force over the interval errs by K Δt/(2 m)";
         p.push(Problem::warning(

@@ -333,7 +333,12 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("dem.coarse_graining", "", "1", "parcel diameter / primary diameter: drag of the primary x ratio^3"),
     ("dem.variables", "", "{}", "passed as -var name value"),
     ("coupling.interval", "DEM steps", "-", "fluid step = interval x dem.time_step"),
-    ("coupling.scheme", "", "conservative", "conservative | explicit"),
+    (
+        "coupling.scheme",
+        "",
+        "conservative",
+        "conservative | conservative-adaptive | explicit | implicit | split | implicit-filled (docs/schemes.md)",
+    ),
     ("coupling.model", "", "A", "A | B: split of pressure gradient and stress"),
     ("coupling.feedback", "", "two-way", "two-way | one-way"),
     ("coupling.continuity", "", "voidage-rate", "voidage-rate (d eps/dt) | solids-flux (SX eq. 2a)"),

@@ -48,6 +48,10 @@ pub trait Mapping {
     fn link_variance(&self, _mesh: &Mesh) -> Vec<f64> {
         Vec::new()
     }
+    /// Σ_k m_ik = 1 to rounding.
+    fn conservative(&self) -> bool {
+        true
+    }
     /// Fills `out`. A particle without host (`NONE`) gets no weight.
     fn weights(&self, mesh: &Mesh, position: &[[f64; 3]], radius: &[f64], host: &[u32], out: &mut Weights);
 }

@@ -31,6 +31,13 @@ impl Weights {
         let range = self.start[i] as usize..self.start[i + 1] as usize;
         self.cell[range.clone()].iter().zip(&self.weight[range]).map(|(c, m)| (*c as usize, *m))
     }
+    /// (cell, m_ik) of particle i.
+    pub fn of(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let whole = self.whole();
+        let range = if whole { i..i + 1 } else { self.start[i] as usize..self.start[i + 1] as usize };
+        let entry = move |k: usize| (self.cell[k], if whole { 1.0 } else { self.weight[k] });
+        range.map(entry).filter(|e| e.0 != NONE).map(|e| (e.0 as usize, e.1))
+    }
     /// Cells that particles go to, with repetitions; `occupied` are their host cells.
     pub fn reached<'a>(&'a self, occupied: &'a [u32]) -> &'a [u32] {
         if self.whole() { occupied } else { &self.cell }

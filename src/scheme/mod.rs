@@ -1,8 +1,30 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Coupling schemes: how the impulse of the coming interval is predicted for the fluid (design §2.2).
+//! Stage 7, coupling schemes: how the impulse of the coming interval is predicted for the fluid (design §2.2).
 //!
-//! J_i ≈ Δt [ C_i (ũ_i + d_i − v_i) + B_i ], ũ_i the gathered fluid velocity *after* the fluid step. Whatever
-//! a scheme predicts, the ledger carries the rest, so every scheme here keeps the third law.
+//! J_i ≈ Δt [ C_i (ũ_i + d_i − v_i) + B_i ], ũ_i the gathered fluid velocity *after* the fluid step. Reads K (kg/s),
+//! slip (m/s) and, if the scheme wants it, what the particle did in its last interval; writes C (kg/s) and B (N).
+//! A conservative scheme leaves the rest to the ledger, so the third law holds whatever it predicts. The schemes of
+//! Radl et al. 2014 replace Sp and Su cell by cell and have no ledger: their third-law error is measured and
+//! reported. A new scheme implements `Scheme` in a file of its own and joins `all`. `docs/schemes.md` compares them.
+
+mod adaptive;
+mod conservative;
+mod explicit;
+mod filled;
+mod history;
+mod implicit;
+mod split;
+pub mod testbench;
+
+pub use adaptive::ConservativeAdaptive;
+pub use conservative::Conservative;
+pub use explicit::Explicit;
+pub use filled::ImplicitFilled;
+pub use history::{History, Last};
+pub use implicit::Implicit;
+pub use split::Split;
+
+use crate::step::Lanes;
 
 /// What a scheme may look at for one particle, at the exchange before the fluid step.
 #[derive(Clone, Copy, Debug)]
@@ -11,6 +33,24 @@ pub struct Before {
     pub drag_coefficient: f64,
     /// ũ + d − v with the fluid of the previous step, m/s
     pub slip: [f64; 3],
+    /// particle mass and added mass, kg
+    pub inertia: f64,
+    /// Δt, s
+    pub period: f64,
+    /// the last interval; `None` for a particle without one (first interval, just inserted)
+    pub last: Option<Last>,
+}
+
+/// What a scheme may look at to form Sp and Su of the cells; by cell slot.
+pub struct Cells<'a> {
+    /// smoothed lanes of `linearise`: 0 C, 1–3 C (v − d) − B − L/Δt, 4 K
+    pub smoothed: &'a [Lanes],
+    /// smoothed ε_s (0) and ε_s U_s (1–3)
+    pub solids: &'a [Lanes],
+    /// ε_s and ε_s U_s as mapped, not smoothed; empty unless `wants_solids`
+    pub mapped: &'a [Lanes],
+    /// fluid velocity of the last step, m/s
+    pub fluid: &'a [[f64; 3]],
 }
 
 /// How the drag impulse is split between fluid matrix and right-hand side.
@@ -19,43 +59,32 @@ pub trait Scheme: Sync {
     fn name(&self) -> &'static str;
     /// Paper and equation.
     fn source(&self) -> &'static str;
+    /// True: what is charged plus the change of the ledger is what the DEM took, to rounding.
+    fn conservative(&self) -> bool {
+        true
+    }
+    /// True: the DEM sends what its last interval was (`History`).
+    fn wants_history(&self) -> bool {
+        false
+    }
+    /// True: the mapped and smoothed solids momentum is needed (`Cells`).
+    fn wants_solids(&self) -> bool {
+        false
+    }
     /// C (kg/s, ≥ 0) and B (N).
     fn predict(&self, before: &Before) -> (f64, [f64; 3]);
-}
-
-/// C = K, B = 0: drag implicit in the coming fluid velocity, exact when steady.
-pub struct Conservative;
-
-impl Scheme for Conservative {
-    fn name(&self) -> &'static str {
-        "conservative"
-    }
-    fn source(&self) -> &'static str {
-        "design §2.2, first choice of (C, B)"
-    }
-    fn predict(&self, before: &Before) -> (f64, [f64; 3]) {
-        (before.drag_coefficient, [0.0; 3])
-    }
-}
-
-/// C = 0, B = K (ũ + d − v): drag from the previous fluid velocity, stable only for Δt below τ_f (R eq. 10).
-pub struct Explicit;
-
-impl Scheme for Explicit {
-    fn name(&self) -> &'static str {
-        "explicit"
-    }
-    fn source(&self) -> &'static str {
-        "Radl et al. 2014, explicit coupling; with the ledger of design §2.2"
-    }
-    fn predict(&self, before: &Before) -> (f64, [f64; 3]) {
-        (0.0, before.slip.map(|s| before.drag_coefficient * s))
+    /// Sp (kg/(m3 s), ≥ 0) and Su (N/m3) of the cells. A conservative scheme keeps the default.
+    fn sources(&self, cells: &Cells, sp: &mut [f64], su: &mut [[f64; 3]]) {
+        for (j, l) in cells.smoothed.iter().enumerate() {
+            sp[j] = l[0];
+            su[j] = [l[1], l[2], l[3]];
+        }
     }
 }
 
 /// All schemes.
 pub fn all() -> &'static [&'static dyn Scheme] {
-    &[&Conservative, &Explicit]
+    &[&Conservative, &ConservativeAdaptive, &Explicit, &Implicit, &Split, &ImplicitFilled]
 }
 
 /// The scheme of that name.

@@ -197,6 +197,9 @@ pub fn message(list: &[P]) -> Vec<u64> {
     let mut blocks = vec![Block::i64s(field::ID, n), Block::f64s(field::TOTALS, 9)];
     let vectors = [field::POSITION, field::VELOCITY, field::LEDGER, field::IMPULSE];
     blocks.extend(vectors.map(|f| Block::f64s(f, 3 * n)));
+    let last = [field::LAST_DRIVE_VELOCITY, field::LAST_FORCE, field::LAST_VELOCITY];
+    blocks.extend(last.map(|f| Block::f64s(f, 3 * n)));
+    blocks.push(Block::f64s(field::LAST_DRAG_COEFFICIENT, n));
     blocks.extend([field::RADIUS, field::MASS].map(|f| Block::f64s(f, n)));
     let mut words = vec![0; frame::words(&blocks)];
     frame::start(&mut words, kind::PARTICLES, 0, 0.0, &blocks);
@@ -205,6 +208,11 @@ pub fn message(list: &[P]) -> Vec<u64> {
         for (f, value) in [(field::POSITION, p.x), (field::VELOCITY, p.v), (field::LEDGER, p.ledger)] {
             frame::f64s_mut(&mut words, f).unwrap()[3 * i..][..3].copy_from_slice(&value);
         }
+        // a last interval in which it was driven by the velocity it has now
+        for (f, value) in [(field::LAST_DRIVE_VELOCITY, p.v), (field::IMPULSE, p.ledger)] {
+            frame::f64s_mut(&mut words, f).unwrap()[3 * i..][..3].copy_from_slice(&value);
+        }
+        frame::f64s_mut(&mut words, field::LAST_DRAG_COEFFICIENT).unwrap()[i] = 1e-6;
         frame::f64s_mut(&mut words, field::RADIUS).unwrap()[i] = p.r;
         frame::f64s_mut(&mut words, field::MASS).unwrap()[i] =
             1000.0 * 4.0 / 3.0 * std::f64::consts::PI * p.r.powi(3);

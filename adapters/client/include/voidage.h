@@ -70,6 +70,18 @@
 // arrays of VOIDAGE_PARTICLES, n particles, DEM to coupler: 9 numbers, N s: sums over this rank of impulse taken, impulse charged, old ledger
 #define VOIDAGE_TOTALS 10
 
+// arrays of VOIDAGE_PARTICLES, n particles, DEM to coupler, if send.history: K of the last interval, kg/s
+#define VOIDAGE_LAST_DRAG_COEFFICIENT 15
+
+// arrays of VOIDAGE_PARTICLES, n particles, DEM to coupler, if send.history: u of the last interval, m/s
+#define VOIDAGE_LAST_DRIVE_VELOCITY 16
+
+// arrays of VOIDAGE_PARTICLES, n particles, DEM to coupler, if send.history: f of the last interval, N
+#define VOIDAGE_LAST_FORCE 17
+
+// arrays of VOIDAGE_PARTICLES, n particles, DEM to coupler, if send.history: velocity at its start, m/s
+#define VOIDAGE_LAST_VELOCITY 18
+
 // arrays of VOIDAGE_DRIVE, same n and order as the particles sent, coupler to DEM: K, kg/s
 #define VOIDAGE_DRAG_COEFFICIENT 20
 

@@ -39,6 +39,14 @@ pub const VOIDAGE_IMPULSE: u32 = 8;
 pub const VOIDAGE_LEDGER: u32 = 9;
 /// arrays of VOIDAGE_PARTICLES, n particles, DEM to coupler: 9 numbers, N s: sums over this rank of impulse taken, impulse charged, old ledger
 pub const VOIDAGE_TOTALS: u32 = 10;
+/// arrays of VOIDAGE_PARTICLES, n particles, DEM to coupler, if send.history: K of the last interval, kg/s
+pub const VOIDAGE_LAST_DRAG_COEFFICIENT: u32 = 15;
+/// arrays of VOIDAGE_PARTICLES, n particles, DEM to coupler, if send.history: u of the last interval, m/s
+pub const VOIDAGE_LAST_DRIVE_VELOCITY: u32 = 16;
+/// arrays of VOIDAGE_PARTICLES, n particles, DEM to coupler, if send.history: f of the last interval, N
+pub const VOIDAGE_LAST_FORCE: u32 = 17;
+/// arrays of VOIDAGE_PARTICLES, n particles, DEM to coupler, if send.history: velocity at its start, m/s
+pub const VOIDAGE_LAST_VELOCITY: u32 = 18;
 /// arrays of VOIDAGE_DRIVE, same n and order as the particles sent, coupler to DEM: K, kg/s
 pub const VOIDAGE_DRAG_COEFFICIENT: u32 = 20;
 /// arrays of VOIDAGE_DRIVE, same n and order as the particles sent, coupler to DEM: u, m/s

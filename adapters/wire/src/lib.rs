@@ -59,6 +59,10 @@ pub mod field {
     pub const IMPULSE: u32 = 8;
     pub const LEDGER: u32 = 9;
     pub const TOTALS: u32 = 10;
+    pub const LAST_DRAG_COEFFICIENT: u32 = 15;
+    pub const LAST_DRIVE_VELOCITY: u32 = 16;
+    pub const LAST_FORCE: u32 = 17;
+    pub const LAST_VELOCITY: u32 = 18;
     pub const DRAG_COEFFICIENT: u32 = 20;
     pub const DRIVE_VELOCITY: u32 = 21;
     pub const FORCE: u32 = 22;
