@@ -280,6 +280,27 @@ pub fn explain(topic: &str) -> u8 {
     OK
 }
 
+/// `voidage bench`
+pub fn bench(json: Option<&Path>, quick: bool) -> u8 {
+    let report = match crate::bench::report::run(quick, |what| eprintln!("{what}")) {
+        Ok(r) => r,
+        Err(e) => {
+            eprintln!("error: {e}");
+            return FAILED;
+        }
+    };
+    println!("{}", report.table());
+    let Some(file) = json else { return OK };
+    let text = serde_json::to_string_pretty(&report).map_err(|e| e.to_string());
+    match text.and_then(|t| std::fs::write(file, t + "\n").map_err(|e| e.to_string())) {
+        Ok(()) => OK,
+        Err(e) => {
+            eprintln!("error: --json {}: {e}", file.display());
+            FAILED
+        }
+    }
+}
+
 /// `voidage version`
 pub fn version() -> u8 {
     println!("voidage {}, wire protocol {PROTOCOL}", env!("CARGO_PKG_VERSION"));

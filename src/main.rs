@@ -59,6 +59,15 @@ enum Command {
         #[arg(default_value = "case")]
         topic: String,
     },
+    /// Measures what the coupling step costs on this machine, and the smoothers' speed and error side by side
+    Bench {
+        /// also write all numbers to this file (fields: src/bench/report.rs)
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+        /// a tenth of the size, for a first look
+        #[arg(long)]
+        quick: bool,
+    },
     /// Prints the versions of this program, its protocol and the partners found
     Version,
 }
@@ -76,6 +85,7 @@ fn main() -> ExitCode {
         Command::Check { case, set } => commands::check(&case, &set),
         Command::Couple { case, resolved, restart } => commands::couple(&case, resolved, restart.as_deref()),
         Command::Explain { topic } => commands::explain(&topic),
+        Command::Bench { json, quick } => commands::bench(json.as_deref(), quick),
         Command::Version => commands::version(),
     };
     ExitCode::from(code)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `voidage bench`: what the coupling step costs and how exact it is, on scenes made here.
 
+pub mod report;
 pub mod scene;
 pub mod smoother;
 pub mod step;

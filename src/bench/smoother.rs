@@ -7,6 +7,7 @@ use super::{scene, triad};
 use crate::locate::Locator;
 use crate::mesh::{Mesh, NONE};
 use crate::smooth::{Active, Diffusion, Direction, Field, Graph, Scratch, Smoother, on};
+use serde::Serialize;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -26,7 +27,7 @@ pub struct Case {
 }
 
 /// One method.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Cost {
     /// name in case.toml
     pub name: &'static str,

@@ -37,6 +37,8 @@ pub struct Case {
 /// What it cost.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Cost {
+    /// mapping
+    pub mapping: &'static str,
     /// particles
     pub particles: usize,
     /// cells
@@ -104,8 +106,14 @@ pub fn run(case: &Case) -> Result<Cost, String> {
     let mut step = CouplingStep::new(mesh, setup(case.drag)?, mapping, main, positive);
     let mut p = scene::bed(scene::BOX, case.particles, scene::DIAMETER);
     let mut seed = 7;
-    let mut cost =
-        Cost { particles: p.len(), cells, degree, us_per_particle: f64::INFINITY, ..Cost::default() };
+    let mut cost = Cost {
+        mapping: case.mapping,
+        particles: p.len(),
+        cells,
+        degree,
+        us_per_particle: f64::INFINITY,
+        ..Cost::default()
+    };
     let mut all = Vec::new();
     for k in 0..=case.repetitions {
         let begin = Instant::now();

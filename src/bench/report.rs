@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The benchmark as a table and as JSON: every step and smoother side by side, measured in one run.
+//!
+//! Reads how thorough to be; writes numbers with their units in the field names. Ratios are of values measured in
+//! the same run; absolute times are those of this machine at this moment.
+
+use super::{smoother, step, triad};
+use serde::Serialize;
+
+/// All numbers of one run.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// program version
+    pub version: &'static str,
+    /// GB/s of the triad on 16 MB, one thread
+    pub triad_16mb_gb_per_s: f64,
+    /// on 256 MB
+    pub triad_256mb_gb_per_s: f64,
+    /// whole coupling steps
+    pub step: Steps,
+    /// the smoother against the papers' way
+    pub smoother: Smoother,
+    /// cost of the mappings
+    pub mapping: Mapping,
+}
+
+/// Whole coupling steps: all three passes, from locate to replies ready, Koch–Hill, model A.
+#[derive(Clone, Debug, Serialize)]
+pub struct Steps {
+    /// N_p / N_c = 2
+    pub us_per_particle_ratio_2: f64,
+    /// N_p / N_c = 16
+    pub us_per_particle_ratio_16: f64,
+    /// every step measured
+    pub cases: Vec<step::Cost>,
+}
+
+/// The smoother's ratios; see `bench::smoother::Numbers`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Smoother {
+    /// time of seven Crank–Nicolson solves in three steps ÷ time of the default
+    pub speedup_vs_cn3: f64,
+    /// error of the same ÷ error of the default
+    pub error_ratio_vs_cn3: f64,
+    /// time of one backward Euler solve per field ÷ time of the default
+    pub speedup_vs_constdiff: f64,
+    /// time ÷ (bytes that must move ÷ triad at that working set)
+    pub bytes_bound_ratio: f64,
+    /// every method
+    pub methods: Vec<smoother::Cost>,
+}
+
+/// Weights alone.
+#[derive(Clone, Debug, Serialize)]
+pub struct Mapping {
+    /// divided volume on hexahedra, µs per particle
+    pub divided_us_per_particle: f64,
+    /// linear deposit on hexahedra, µs per particle
+    pub linear_us_per_particle: f64,
+}
+
+/// Measures; `quick`: a tenth of the size, for a first look.
+pub fn run(quick: bool, mut say: impl FnMut(&str)) -> Result<Report, String> {
+    let part = if quick { 10 } else { 1 };
+    let repetitions = if quick { 5 } else { 12 };
+    let case = |particles: usize, cells: usize, mapping| step::Case {
+        particles: particles / part,
+        cells: cells / part,
+        bandwidth: 4.8e-3,
+        tolerance: 1e-2,
+        drag: "koch-hill",
+        mapping,
+        repetitions,
+    };
+    let mut cases = Vec::new();
+    for (particles, cells, mapping) in [
+        (332_000, 166_000, "particle-centroid"),
+        (332_640, 20_700, "particle-centroid"),
+        (332_000, 166_000, "linear"),
+        (332_000, 166_000, "divided-volume"),
+    ] {
+        say(&format!("step: {mapping}, {} particles on {} cells", particles / part, cells / part));
+        cases.push(step::run(&case(particles, cells, mapping))?);
+    }
+    say("smoother: the default against Crank-Nicolson, backward Euler and others");
+    let scene = smoother::Case {
+        cells: 170_000 / part,
+        width: 4.0,
+        tolerance: 1e-4,
+        filled: 0.25,
+        repetitions: if quick { 5 } else { 30 },
+    };
+    let s = smoother::run(&scene, &["uniformization", "crank-nicolson", "backward-euler", "constdiff"])?;
+    let weights = |c: &step::Cost| c.map_ms * 1e3 / c.particles as f64;
+    Ok(Report {
+        version: env!("CARGO_PKG_VERSION"),
+        triad_16mb_gb_per_s: triad::bandwidth(16 << 20, 1, 40),
+        triad_256mb_gb_per_s: triad::bandwidth(256 << 20, 1, 8),
+        mapping: Mapping {
+            divided_us_per_particle: weights(&cases[3]),
+            linear_us_per_particle: weights(&cases[2]),
+        },
+        step: Steps {
+            us_per_particle_ratio_2: cases[0].us_per_particle,
+            us_per_particle_ratio_16: cases[1].us_per_particle,
+            cases,
+        },
+        smoother: Smoother {
+            speedup_vs_cn3: s.speedup_vs_cn3,
+            error_ratio_vs_cn3: s.error_ratio_vs_cn3,
+            speedup_vs_constdiff: s.speedup_vs_constdiff,
+            bytes_bound_ratio: s.bytes_bound_ratio,
+            methods: s.methods,
+        },
+    })
+}
+
+impl Report {
+    /// For people.
+    pub fn table(&self) -> String {
+        let mut t = String::from(
+            "coupling step, one thread: locate to replies ready, Koch-Hill, model A, b = 4 d, tolerance 1e-2\n  \
+             mapping              particles    cells  sweeps  us/particle   locate  order    map  solids  forces sources  gather   drive (ms)\n",
+        );
+        for c in &self.step.cases {
+            t += &format!(
+                "  {:18} {:11} {:8} {:7} {:12.3} {:8.2} {:6.2} {:6.1} {:7.2} {:7.2} {:7.2} {:7.2} {:7.2}\n",
+                c.mapping,
+                c.particles,
+                c.cells,
+                c.degree,
+                c.us_per_particle,
+                c.locate_ms,
+                c.arrange_ms,
+                c.map_ms,
+                c.solids_ms,
+                c.forces_ms,
+                c.sources_ms,
+                c.gather_ms,
+                c.drive_ms
+            );
+        }
+        let s = &self.smoother;
+        t += "smoother, one thread: seven fields, b/h = 4, a quarter of the box filled, tolerance 1e-4\n  \
+              method                     ms      error   least eps_s   conservation  sweeps\n";
+        for m in &s.methods {
+            t += &format!(
+                "  {:20} {:9.2} {:10.2e} {:13.2e} {:14.1e} {:7}\n",
+                m.name,
+                m.seconds * 1e3,
+                m.error,
+                m.least,
+                m.conservation,
+                m.degree
+            );
+        }
+        t += &format!(
+            "  default against Crank-Nicolson in 3 steps: {:.1} x faster, error {:.0} x smaller; against one backward \
+             Euler solve per field: {:.1} x faster; {:.2} x the time its bytes need\n\
+             machine: triad {:.0} GB/s on 16 MB, {:.0} GB/s on 256 MB",
+            s.speedup_vs_cn3,
+            s.error_ratio_vs_cn3,
+            s.speedup_vs_constdiff,
+            s.bytes_bound_ratio,
+            self.triad_16mb_gb_per_s,
+            self.triad_256mb_gb_per_s
+        );
+        t
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_small_bench_has_every_number() {
+        let case = super::step::Case {
+            particles: 2000,
+            cells: 1000,
+            bandwidth: 4.8e-3,
+            tolerance: 1e-2,
+            drag: "koch-hill",
+            mapping: "divided-volume",
+            repetitions: 2,
+        };
+        let c = super::step::run(&case).unwrap();
+        assert!(c.us_per_particle.is_finite() && c.map_ms > 0.0 && c.solid_volume_error < 1e-12);
+        let text = serde_json::to_string(&c).unwrap();
+        assert!(text.contains("\"us_per_particle\""));
+        let unknown = super::step::Case { mapping: "none", ..case };
+        assert!(super::step::run(&unknown).unwrap_err().contains("mapping none is not known"));
+    }
+}
