@@ -15,10 +15,14 @@ mod average;
 pub mod coefficients;
 mod diffusion;
 mod direct;
+pub mod factors;
 mod field;
 mod graph;
 mod pcg;
 mod polynomial;
+mod product;
+mod real;
+mod recurrence;
 mod sweep;
 
 pub use active::Active;
@@ -132,7 +136,7 @@ pub const NAMES: &[&str] = &[
 
 /// Above this tolerance `chebyshev` keeps the kernel's variance exactly; below, the plain series is nearer to exp(Δ_T).
 const MATCHED: f64 = 1e-3;
-/// Residual at which the implicit solves end, relative to the first (the papers' baseline).
+/// Normalised residual at which the implicit solves end (OpenFOAM's `tolerance`; the papers' baseline).
 const SOLVED: f64 = 1e-6;
 /// Steps of `backward-euler`.
 const EULER_STEPS: usize = 4;
