@@ -4,7 +4,7 @@
 //! Reads how thorough to be; writes numbers with their units in the field names. Ratios are of values measured in
 //! the same run; absolute times are those of this machine at this moment.
 
-use super::{smoother, step, triad};
+use super::{memory, plot, scaling, scene, smoother, step, triad};
 use serde::Serialize;
 
 /// All numbers of one run.
@@ -22,6 +22,10 @@ pub struct Report {
     pub smoother: Smoother,
     /// cost of the mappings
     pub mapping: Mapping,
+    /// memory of the coupler process
+    pub memory: memory::Memory,
+    /// how the step's cost grows
+    pub scaling: Vec<scaling::Series>,
 }
 
 /// Whole coupling steps: all three passes, from locate to replies ready, Koch–Hill, model A.
@@ -75,7 +79,11 @@ pub struct Mapping {
 
 /// Measures; `quick`: a tenth of the size, for a first look.
 pub fn run(quick: bool, mut say: impl FnMut(&str)) -> Result<Report, String> {
+    say("memory");
+    let memory = memory::run(if quick { 10 } else { 1 })?;
     let step = steps(quick, &mut say)?;
+    say("cost over two decades of particles and cells");
+    let scaling = scaling::run(if quick { 33_200 } else { 332_000 })?;
     say("smoother: the default against Crank-Nicolson, backward Euler and others");
     let smoother = smoothers(quick)?;
     let weights = |c: &step::Cost| c.map_ms * 1e3 / c.particles as f64;
@@ -89,6 +97,8 @@ pub fn run(quick: bool, mut say: impl FnMut(&str)) -> Result<Report, String> {
         },
         step,
         smoother,
+        memory,
+        scaling,
     })
 }
 
@@ -97,6 +107,7 @@ pub fn steps(quick: bool, mut say: impl FnMut(&str)) -> Result<Steps, String> {
     let part = if quick { 10 } else { 1 };
     let case = |particles: usize, cells: usize, mapping| step::Case {
         particles: particles / part,
+        diameter: scene::DIAMETER,
         cells: cells / part,
         bandwidth: 4.8e-3,
         tolerance: 1e-2,
@@ -155,13 +166,30 @@ pub fn smoothers(quick: bool) -> Result<Smoother, String> {
 impl Report {
     /// For people.
     pub fn table(&self) -> String {
+        let mut t = self.step.table();
+        t += "cost of the step over two decades, particle centroid, b/h = 2.1: particles, cells, ms\n";
+        for s in &self.scaling {
+            let points = s.points.iter().map(|p| format!("  {} {} {:.3}", p.0, p.1, p.2)).collect::<String>();
+            t += &format!("  {:20} N^{:.2}: {points}\n", s.grows, s.exponent);
+        }
+        t += &format!(
+            "memory: {:.0} bytes per cell, {:.0} per particle\n",
+            self.memory.bytes_per_cell, self.memory.bytes_per_particle
+        );
         format!(
-            "{}{}machine: triad {:.0} GB/s on 16 MB, {:.0} GB/s on 256 MB",
-            self.step.table(),
+            "{t}{}machine: triad {:.0} GB/s on 16 MB, {:.0} GB/s on 256 MB",
             self.smoother.table(),
             self.triad_16mb_gb_per_s,
             self.triad_256mb_gb_per_s
         )
+    }
+}
+
+impl Report {
+    /// The speed–accuracy table as a picture.
+    pub fn plot(&self) -> String {
+        let title = format!("Smoothing seven fields, {} cells, b/h = 4, one thread", self.smoother.cells);
+        plot::svg(&self.smoother.methods, &title)
     }
 }
 
@@ -199,16 +227,17 @@ impl Smoother {
     pub fn table(&self) -> String {
         let mut t = format!(
             "smoother, one thread: seven fields, {} cells, b/h = 4, a quarter of the box filled; CPU time\n  \
-             method               tolerance        ms      error   least eps_s   conservation  sweeps\n",
+             method               tolerance        ms      error vs Gaussian   least eps_s   conservation  sweeps\n",
             self.cells
         );
         for m in &self.methods {
             t += &format!(
-                "  {:20} {:9.0e} {:9.2} {:10.2e} {:13.2e} {:14.1e} {:7}\n",
+                "  {:20} {:9.0e} {:9.2} {:10.2e} {:11.2e} {:13.2e} {:14.1e} {:7}\n",
                 m.name,
                 m.tolerance,
                 m.seconds * 1e3,
                 m.error,
+                m.error_gaussian,
                 m.least,
                 m.conservation,
                 m.degree
@@ -238,6 +267,7 @@ mod tests {
     fn a_small_bench_has_every_number() {
         let case = super::step::Case {
             particles: 2000,
+            diameter: super::scene::DIAMETER,
             cells: 1000,
             bandwidth: 4.8e-3,
             tolerance: 1e-2,

@@ -3,9 +3,10 @@
 //!
 //! Times are CPU seconds of the calling thread, medians; errors relative in L2 (V norm) against exp(Δ_T) to 1e-13.
 
-use super::{scene, triad};
+use super::{gauss, scene, triad};
 use crate::locate::Locator;
 use crate::mesh::{Mesh, NONE};
+use crate::particles::Particles;
 use crate::smooth::{Active, Diffusion, Direction, Field, Graph, Scratch, Smoother, on};
 use crate::sums::sum;
 use serde::Serialize;
@@ -40,6 +41,8 @@ pub struct Cost {
     pub seconds: f64,
     /// of ε_s
     pub error: f64,
+    /// of ε_s, against the exact Gaussians of the particles (deposit: particle centroid)
+    pub error_gaussian: f64,
     /// smallest ε_s
     pub least: f64,
     /// |Σ V φ' − Σ V φ| / Σ V φ of ε_s
@@ -77,11 +80,21 @@ pub struct Numbers {
     pub speedup_vs_constdiff: f64,
 }
 
+/// Volume of a sphere, m3.
+fn sphere() -> f64 {
+    std::f64::consts::PI / 6.0 * scene::DIAMETER.powi(3)
+}
+
+/// Spheres that fill a share of the box.
+fn bed(filled: f64) -> Particles {
+    let count = (filled * scene::BOX.iter().product::<f64>() * scene::PACKING / sphere()) as usize;
+    scene::bed(scene::BOX, count, scene::DIAMETER)
+}
+
 /// Raw fields of a bed of spheres: ε_s, ε_s U_s, and a force (seven lanes); occupied cells.
 pub fn fields(mesh: &Mesh, filled: f64) -> Result<(Field, Vec<u32>), String> {
-    let sphere = std::f64::consts::PI / 6.0 * scene::DIAMETER.powi(3);
-    let count = (filled * scene::BOX.iter().product::<f64>() * scene::PACKING / sphere) as usize;
-    let mut p = scene::bed(scene::BOX, count, scene::DIAMETER);
+    let (sphere, mut p) = (sphere(), bed(filled));
+    let count = p.len();
     let mut hosts = vec![NONE; count];
     let lost = Locator::new(mesh).locate(mesh, &mut p.position, &mut hosts);
     lost.map_err(|l| format!("{} spheres outside", l.len()))?;
@@ -142,6 +155,8 @@ pub fn run(case: &Case, others: &[(&str, f64)]) -> Result<Numbers, String> {
     let norm = |f: &dyn Fn(usize) -> f64| sum((0..mesh.len()).map(f));
     let size = norm(&|j| mesh.volume[j] * exact[j][0].powi(2));
     let total = norm(&|j| mesh.volume[j] * raw[j][0]);
+    let gaussian = gauss::solid_fraction(&bed(case.filled).position, sphere(), case.cells, case.width * h);
+    let gaussian_size = norm(&|j| mesh.volume[j] * gaussian[j].powi(2));
     let mut field = raw.clone();
     let mut time = |e: &mut Entry, direction, times: usize, field: &mut Field| {
         let once = |_| {
@@ -155,6 +170,7 @@ pub fn run(case: &Case, others: &[(&str, f64)]) -> Result<Numbers, String> {
         tolerance,
         seconds: median(e.seconds.clone()),
         error: (norm(&|j| mesh.volume[j] * (field[j][0] - exact[j][0]).powi(2)) / size).sqrt(),
+        error_gaussian: (norm(&|j| mesh.volume[j] * (field[j][0] - gaussian[j]).powi(2)) / gaussian_size).sqrt(),
         least: field.iter().map(|l| l[0]).fold(f64::INFINITY, f64::min),
         conservation: (norm(&|j| mesh.volume[j] * field[j][0]) / total - 1.0).abs(),
         degree: e.smoother.degree(),

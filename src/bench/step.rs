@@ -20,6 +20,8 @@ use std::time::Instant;
 pub struct Case {
     /// number of particles
     pub particles: usize,
+    /// of the spheres, m
+    pub diameter: f64,
     /// number of cells wanted
     pub cells: usize,
     /// b, m
@@ -97,14 +99,14 @@ pub fn run(case: &Case) -> Result<Cost, String> {
     let fluid = scene::air(&mesh);
     let mapping = map::all().into_iter().find(|m| m.name() == case.mapping);
     let mut mapping = mapping.ok_or_else(|| format!("mapping {} is not known", case.mapping))?;
-    mapping.prepare(&mesh, &map::Options { bandwidth: case.bandwidth, grid: 2.4 * scene::DIAMETER });
+    mapping.prepare(&mesh, &map::Options { bandwidth: case.bandwidth, grid: 2.4 * case.diameter });
     let t = smooth::Diffusion::uniform(case.bandwidth).links(&mesh);
     let graph = std::sync::Arc::new(smooth::Graph::new(&mesh, &t));
     let smoother = |name| smooth::on(name, &mesh, &t, &graph, case.tolerance).ok_or("no smoother");
     let (main, positive) = (smoother("chebyshev")?, smoother("uniformization")?);
     let (cells, degree) = (mesh.len(), main.degree());
     let mut step = CouplingStep::new(mesh, setup(case.drag)?, mapping, main, positive);
-    let mut p = scene::bed(scene::BOX, case.particles, scene::DIAMETER);
+    let mut p = scene::bed(scene::BOX, case.particles, case.diameter);
     let mut seed = 7;
     let mut cost = Cost {
         mapping: case.mapping,
