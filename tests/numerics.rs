@@ -513,7 +513,11 @@ fn a_scheme_that_needs_the_last_interval_says_so() {
 }
 
 /// Bits of Sp, Su, ε and of each particle's reply (by id) after two exchanges on so many threads.
-fn bits_on(threads: usize, backwards: bool, mapping: &str) -> (Vec<[u64; 5]>, Vec<(i64, [u64; 10])>, [u64; 7]) {
+fn bits_on(
+    threads: usize,
+    backwards: bool,
+    mapping: &str,
+) -> (Vec<[u64; 5]>, Vec<(i64, [u64; 10])>, [u64; 7]) {
     use voidage::bench::{scene, step::setup};
     let mesh = scene::mesh(scene::BOX, 12_000);
     let air = scene::air(&mesh);

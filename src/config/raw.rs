@@ -314,7 +314,12 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("format", "", "-", "version of this file, 1"),
     ("run.dem_ranks", "", "1", "MPI ranks of the particle program"),
     ("run.cfd_ranks", "", "1", "MPI ranks of the fluid solver; the case is decomposed when needed"),
-    ("run.threads", "", "1", "threads of the coupler; the results do not depend on them. The partners wait meanwhile, so their cores are free"),
+    (
+        "run.threads",
+        "",
+        "1",
+        "threads of the coupler; the results do not depend on them. The partners wait meanwhile, so their cores are free",
+    ),
     ("fluid.case", "", "fluid", "OpenFOAM case, below the case folder"),
     ("fluid.solver", "", "voidageFoam", "voidageFoam, or a stock solver with fvOptions (dilute, model B)"),
     ("fluid.density", "kg/m3", "-", "density of the fluid"),
