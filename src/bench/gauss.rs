@@ -17,8 +17,7 @@ fn shares(x: f64, length: f64, cells: usize, b: f64, out: &mut Vec<f64>) -> usiz
     let h = length / cells as f64;
     let first = (((x - 4.0 * b) / h).floor().max(0.0) as usize).min(cells - 1);
     let end = (((x + 4.0 * b) / h).ceil() as usize).clamp(first + 1, cells);
-    let below =
-        |y: f64| [x, -x, 2.0 * length - x].iter().map(|x| 0.5 * erf((y - x) / b)).sum::<f64>();
+    let below = |y: f64| [x, -x, 2.0 * length - x].iter().map(|x| 0.5 * erf((y - x) / b)).sum::<f64>();
     out.clear();
     let mut last = below(first as f64 * h);
     for i in first..end {

@@ -23,7 +23,8 @@ pub struct Memory {
 fn peak() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
-    line.and_then(|l| l.trim().strip_suffix(" kB")).and_then(|l| l.trim().parse().ok()).unwrap_or(0.0) * 1024.0
+    line.and_then(|l| l.trim().strip_suffix(" kB")).and_then(|l| l.trim().parse().ok()).unwrap_or(0.0)
+        * 1024.0
 }
 
 /// Measures; must run before anything large. `part`: sizes are divided by it.

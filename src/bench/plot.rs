@@ -16,7 +16,8 @@ const COLOURS: [&str; 8] =
 
 /// Decades that hold all values.
 fn decades(values: impl Iterator<Item = f64>) -> [i32; 2] {
-    let (low, high) = values.filter(|v| *v > 0.0).fold((f64::INFINITY, 0.0f64), |r, v| (r.0.min(v), r.1.max(v)));
+    let (low, high) =
+        values.filter(|v| *v > 0.0).fold((f64::INFINITY, 0.0f64), |r, v| (r.0.min(v), r.1.max(v)));
     if low > high {
         return [0, 1];
     }
@@ -39,7 +40,14 @@ pub fn svg(methods: &[Cost], title: &str) -> String {
             names.push(m.name);
         }
     }
-    panel(&mut s, methods, &names, |m| m.error, "relative L2 error of the solid fraction against exp(Δ_T)", LEFT);
+    panel(
+        &mut s,
+        methods,
+        &names,
+        |m| m.error,
+        "relative L2 error of the solid fraction against exp(Δ_T)",
+        LEFT,
+    );
     panel(
         &mut s,
         methods,

@@ -170,7 +170,8 @@ pub fn run(case: &Case, others: &[(&str, f64)]) -> Result<Numbers, String> {
         tolerance,
         seconds: median(e.seconds.clone()),
         error: (norm(&|j| mesh.volume[j] * (field[j][0] - exact[j][0]).powi(2)) / size).sqrt(),
-        error_gaussian: (norm(&|j| mesh.volume[j] * (field[j][0] - gaussian[j]).powi(2)) / gaussian_size).sqrt(),
+        error_gaussian: (norm(&|j| mesh.volume[j] * (field[j][0] - gaussian[j]).powi(2)) / gaussian_size)
+            .sqrt(),
         least: field.iter().map(|l| l[0]).fold(f64::INFINITY, f64::min),
         conservation: (norm(&|j| mesh.volume[j] * field[j][0]) / total - 1.0).abs(),
         degree: e.smoother.degree(),
@@ -201,9 +202,8 @@ pub fn run(case: &Case, others: &[(&str, f64)]) -> Result<Numbers, String> {
         e.seconds = vec![time(&mut e, Direction::Spread, times, &mut field)];
         methods.push(cost(&e, *tolerance, &field));
     }
-    let speedup = |i: usize| {
-        median((0..case.rounds).map(|r| entries[i].seconds[r] / entries[0].seconds[r]).collect())
-    };
+    let speedup =
+        |i: usize| median((0..case.rounds).map(|r| entries[i].seconds[r] / entries[0].seconds[r]).collect());
     Ok(Numbers {
         cells: mesh.len(),
         active: active.rows.len(),

@@ -5,6 +5,7 @@
 //! the errors the step itself reports. Receiving and sending are not in it.
 
 use super::scene;
+use super::triad::cpu_seconds;
 use crate::forces::Extra;
 use crate::interpolate::FluidVelocity;
 use crate::map;
@@ -12,7 +13,6 @@ use crate::smooth;
 use crate::step::{CouplingStep, Seconds, Setup};
 use crate::{forces, scheme};
 use serde::Serialize;
-use std::time::Instant;
 
 /// The step to be timed.
 #[derive(Clone, Debug)]
@@ -117,10 +117,10 @@ pub fn run(case: &Case) -> Result<Cost, String> {
     };
     let mut all = Vec::new();
     for k in 0..=case.repetitions {
-        let begin = Instant::now();
+        let begin = cpu_seconds();
         step.before_fluid(&mut p, k == 0).map_err(|e| e.to_string())?;
         step.after_fluid(&p, &fluid, k == 0).map_err(|e| e.to_string())?;
-        let us = begin.elapsed().as_secs_f64() * 1e6 / p.len() as f64;
+        let us = (cpu_seconds() - begin) * 1e6 / p.len() as f64;
         cost.solid_volume_error = cost.solid_volume_error.max(step.facts.solid_volume_error);
         for x in &mut p.position {
             (0..3).for_each(|a| x[a] += 2e-5 * (scene::random(&mut seed) - 0.5));

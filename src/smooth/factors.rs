@@ -37,9 +37,7 @@ impl Factor {
     pub fn value(&self, x: f64) -> f64 {
         match *self {
             Self::Real { root } => (x - root) / (1.0 - root),
-            Self::Pair { real: u, imaginary: v } => {
-                ((x - u).powi(2) + v * v) / ((1.0 - u).powi(2) + v * v)
-            }
+            Self::Pair { real: u, imaginary: v } => ((x - u).powi(2) + v * v) / ((1.0 - u).powi(2) + v * v),
         }
     }
 }
@@ -74,9 +72,8 @@ pub fn factors(kind: Kind, c: &[f64], tolerance: f64) -> Option<Vec<Factor>> {
     let points: Vec<f64> =
         (0..=POINTS).map(|i| (std::f64::consts::PI * i as f64 / POINTS as f64).cos()).collect();
     let largest = |p: &[f64]| p.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
-    let times = |p: &[f64], f: &Factor| -> Vec<f64> {
-        p.iter().zip(&points).map(|(p, x)| p * f.value(*x)).collect()
-    };
+    let times =
+        |p: &[f64], f: &Factor| -> Vec<f64> { p.iter().zip(&points).map(|(p, x)| p * f.value(*x)).collect() };
     let one = vec![1.0; points.len()];
     let mut product = one.clone();
     let (mut order, mut before) = (Vec::new(), Vec::new());

@@ -9,8 +9,8 @@ use super::coefficients::{self, Kind};
 use super::factors;
 use super::graph::{Graph, Rows};
 use super::product::Product;
-use super::recurrence::{self, Recurrence};
 use super::real::Real;
+use super::recurrence::{self, Recurrence};
 use super::{Active, Direction, Positivity, Properties, Scratch, Smoother};
 use crate::step::Lanes;
 use std::sync::Arc;
@@ -215,4 +215,73 @@ fn totals(lanes: &[Lanes], volume: &[f64]) -> (Lanes, Lanes) {
         crate::sums::sum(lanes.iter().zip(volume).map(|(x, v)| v * f(x[l])))
     };
     (std::array::from_fn(|l| of(&|x| x, l)), std::array::from_fn(|l| of(&f64::abs, l)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::made::Made;
+    use crate::smooth::Diffusion;
+
+    /// Lines of hexahedra go without indices; the same rows one by one, by their indices, give the same bits.
+    #[test]
+    fn lines_have_the_bits_of_single_rows() {
+        for n in [[30, 5, 6], [9, 40, 1], [3, 4, 5]] {
+            let mesh = Made::graded(n, [0.06, 0.04, 0.05]).mesh();
+            let graph = Graph::new(&mesh, &Diffusion::uniform(0.012).links(&mesh));
+            assert_eq!(graph.in_lines() > 0.5, n[0] >= 9, "{n:?}: {}", graph.in_lines());
+            let mut single = graph.clone();
+            single.rows.forget_lines();
+            assert_eq!(single.in_lines(), 0.0);
+            let mut seed = 3;
+            let random = |_| std::array::from_fn(|_| crate::bench::scene::random(&mut seed));
+            let field: Vec<Lanes> = (0..mesh.len()).map(random).collect();
+            let of = |graph: &Graph, make: fn(Arc<Graph>) -> Polynomial| {
+                let (mut out, mut s) = (field.clone(), make(Arc::new(graph.clone())));
+                let active = Active::whole(mesh.len());
+                s.apply(&mut out, &active, Direction::Spread, &mut Scratch::default());
+                out
+            };
+            let makes: [fn(Arc<Graph>) -> Polynomial; 3] = [
+                |g| Polynomial::chebyshev(g, 1e-4, false),
+                |g| Polynomial::chebyshev(g, 1e-13, false),
+                |g| Polynomial::uniformization(g, 1e-4),
+            ];
+            for make in makes {
+                assert_eq!(of(&graph, make), of(&single, make), "{n:?}");
+            }
+        }
+    }
+
+    /// The product and the recurrence are one polynomial.
+    #[test]
+    fn both_forms_agree() {
+        let mesh = Made::tet([7, 6, 5], [0.06, 0.04, 0.05]).mesh();
+        let graph = Arc::new(Graph::new(&mesh, &Diffusion::uniform(0.012).links(&mesh)));
+        let mut field = vec![[0.0; 8]; mesh.len()];
+        field[mesh.len() / 2] = [1.0; 8];
+        for tolerance in [1e-2, 1e-4, 1e-6] {
+            let mut product = Polynomial::chebyshev(Arc::clone(&graph), tolerance, tolerance > 1e-3);
+            let Form::Product(p) = &product.form else { panic!("{tolerance}: the recurrence was chosen") };
+            let a = 0.5 * graph.spectrum;
+            assert!((p.scale * graph.spectrum / 2.0 - 1.0).abs() < 1e-12, "not the certified one");
+            let alpha = coefficients::chebyshev(Kind::First, a, tolerance, tolerance > 1e-3);
+            let mut recurrence = product.clone();
+            recurrence.form = Form::Recurrence(Recurrence {
+                alpha,
+                gamma: 2.0,
+                last: 1.0,
+                three_terms: true,
+                scale: p.scale,
+            });
+            let whole = Active::whole(mesh.len());
+            let mut of = |s: &mut Polynomial| {
+                let mut out = field.clone();
+                s.apply(&mut out, &whole, Direction::Spread, &mut Scratch::default());
+                out
+            };
+            let (a, b) = (of(&mut product), of(&mut recurrence));
+            assert!(a.iter().zip(&b).all(|(a, b)| (a[0] - b[0]).abs() < 1e-12), "{tolerance}");
+        }
+    }
 }

@@ -88,7 +88,9 @@ pub(super) fn apply<T: Real>(
 pub(super) fn copy<T: Real>(from: &[[T; 8]], to: &mut [[T; 8]], active: &Active, reach: usize) {
     use super::active::BLOCK;
     let blocks = from.chunks(BLOCK).zip(to.chunks_mut(BLOCK)).zip(&active.blocks);
-    blocks.filter(|(_, ring)| usize::from(**ring) <= reach).for_each(|((from, to), _)| to.copy_from_slice(from));
+    blocks
+        .filter(|(_, ring)| usize::from(**ring) <= reach)
+        .for_each(|((from, to), _)| to.copy_from_slice(from));
 }
 
 /// Bytes that must move between memory and the core in one application in f64: fields once per sweep, rows once.

@@ -103,7 +103,15 @@ struct Rest<'a, T: Real, S: Simd, const KIND: u8> {
 
 impl<T: Real, S: Simd, const KIND: u8> Rest<'_, T, S, KIND> {
     #[inline(always)]
-    fn result(&self, k: [T::Of<S>; 4], x: T::Of<S>, flux: T::Of<S>, i: usize, lane: usize, out: &mut T::Of<S>) {
+    fn result(
+        &self,
+        k: [T::Of<S>; 4],
+        x: T::Of<S>,
+        flux: T::Of<S>,
+        i: usize,
+        lane: usize,
+        out: &mut T::Of<S>,
+    ) {
         let v = self.v;
         let mut y = T::add(v, T::mul(v, k[0], x), T::mul(v, k[1], flux));
         if KIND & OTHER > 0 {
