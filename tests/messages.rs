@@ -74,6 +74,16 @@ fn errors() {
         (SETTLING, &[], &["limits.wait=0.1"], &["limits.wait = 0.1", "between 1e0"]),
         (SETTLING, &[], &["limits.voidage_min=2.0"], &["limits.voidage_min = 2", "between"]),
         (BED, &[], &["smooth.tolerance=0.5"], &["smooth.tolerance = 0.5", "between"]),
+        (BED, &[], &["smooth.bandwidth=wide"], &["smooth.bandwidth = \"wide\"", "a number (m), or \"wake\""]),
+        (
+            BED,
+            &[
+                ("fluid/0/U", "0 0.9 0", "0 0 0"),
+                ("case.toml", "gravity = [0.0, -9.81, 0.0]", "gravity = [0.0, 0.0, 0.0]"),
+            ],
+            &["smooth.bandwidth=wake"],
+            &["smooth.bandwidth = \"wake\"", "there is no wake", "a number, m"],
+        ),
         (BED, &[], &["smooth.bandwidth=0.0"], &["smooth.bandwidth = 0", "give smooth.bandwidth in m"]),
         (SETTLING, &[], &["run.dem_ranks=0"], &["run.dem_ranks = 0", "at least 1", "run.dem_ranks = 1"]),
         (SETTLING, &[], &["run.cfd_ranks=0"], &["run.cfd_ranks = 0", "run.cfd_ranks = 1"]),
@@ -229,6 +239,19 @@ fn warnings() {
             assert!(lines.iter().any(|l| l.contains(w)), "{w:?} is missing ({set:?} {edits:?}): {text}");
         }
     }
+    // the bandwidth against the wake: Re = 0.9 m/s 1.2 mm / 1.5e-5 m2/s; and as a value
+    let (_, text) = check("wake-note", BED, &[], &[]);
+    let says = [
+        "note: smooth.bandwidth = 0.0048: 4.00 particle diameters",
+        "Re 72.00",
+        "b = 5.0 diameters",
+        "4 to 6",
+    ];
+    assert!(says.iter().all(|w| text.contains(w)), "{text}");
+    let (code, text) = check("wake", BED, &[], &["smooth.bandwidth=wake"]);
+    assert!(code == 0 && text.contains("note: smooth.bandwidth = 0.0059") && text.contains("4.9"), "{text}");
+    let (_, text) = check("wake-far", BED, &[], &["smooth.bandwidth=0.03"]);
+    assert!(text.contains("warning: smooth.bandwidth = 0.03: 25.00 particle diameters"), "{text}");
     // settled walls that let the fluid slip have no profile: nothing to warn of
     assert!(!check("slip", BED, &[], &[]).1.contains("laminar profile"));
 }

@@ -2,7 +2,7 @@
 //! What cannot work, or will surprise: checked across case.toml, the OpenFOAM case and the DEM script.
 
 use super::resolution::{courant, gather_bias, relaxation};
-use super::{Config, Feedback, GravityTreatment, InInterval, Model, Problem, foam, script};
+use super::{Config, Feedback, GravityTreatment, InInterval, Model, Problem, bandwidth, foam, script};
 
 /// All problems of a case, errors first.
 pub fn check(c: &Config) -> Vec<Problem> {
@@ -46,7 +46,7 @@ pub fn check(c: &Config) -> Vec<Problem> {
     if let (Some(mesh), Ok(s)) = (foam::extent(&case), &script) {
         meshes(c, &mesh, s, &mut p);
     }
-    p.sort_by_key(|x| x.severity == super::Severity::Warning);
+    p.sort_by_key(|x| x.severity);
     p
 }
 
@@ -258,6 +258,7 @@ fn dem(c: &Config, s: &script::Script, p: &mut Vec<Problem>) {
                 fix,
             ));
         }
+        bandwidth::advice(c, s, p);
         if let Some(rho) = s.density {
             relaxation(c, r, rho, s.count, p);
         }

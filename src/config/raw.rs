@@ -356,7 +356,12 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
         "chebyshev",
         "chebyshev | chebyshev-u | uniformization (positive by proof) | crank-nicolson | crank-nicolson-1 | backward-euler | constdiff | direct | none",
     ),
-    ("smooth.bandwidth", "m", "-", "b of the Gaussian exp(-r2/b2); 4 to 6 particle diameters"),
+    (
+        "smooth.bandwidth",
+        "m",
+        "-",
+        "b of the Gaussian exp(-r2/b2); 4 to 6 particle diameters, or \"wake\": from the particles' wake, see `voidage check`",
+    ),
     (
         "smooth.tolerance",
         "",
@@ -418,8 +423,9 @@ pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) 
     (best.0 <= name.len() / 2 + 1).then_some(best.1)
 }
 
-/// Parses and applies overrides. Problems without a place are about the file itself.
-pub(super) fn parse(text: &str, overrides: &[(String, String)]) -> Result<CaseFile, Vec<Problem>> {
+/// Parses and applies overrides; true: the bandwidth is to be taken from the wake. Problems without a place are about
+/// the file itself.
+pub(super) fn parse(text: &str, overrides: &[(String, String)]) -> Result<(CaseFile, bool), Vec<Problem>> {
     let syntax = |e: toml::de::Error| {
         let line = e.span().map(|s| text[..s.start.min(text.len())].lines().count().max(1));
         let given = line.map(|l| format!("line {l}")).unwrap_or_default();
@@ -433,11 +439,30 @@ pub(super) fn parse(text: &str, overrides: &[(String, String)]) -> Result<CaseFi
     if !unknown.is_empty() {
         return Err(unknown);
     }
+    let wake = bandwidth_word(&mut table)?;
     let file = CaseFile::deserialize(table).map_err(|e| {
         vec![Problem::error("", "its content", &e.message().replace('\n', " "), "see `voidage explain`")]
     })?;
     let problems = names(&file);
-    if problems.is_empty() { Ok(file) } else { Err(problems) }
+    if problems.is_empty() { Ok((file, wake)) } else { Err(problems) }
+}
+
+/// A word in the place of the bandwidth: "wake", to be replaced by a number later.
+fn bandwidth_word(table: &mut toml::Table) -> Result<bool, Vec<Problem>> {
+    let smooth = table.get_mut("smooth").and_then(toml::Value::as_table_mut);
+    let Some(value) = smooth.and_then(|t| t.get_mut("bandwidth")) else { return Ok(false) };
+    match value.as_str() {
+        None => Ok(false),
+        Some("wake") => {
+            *value = toml::Value::Float(0.0);
+            Ok(true)
+        }
+        Some(other) => {
+            let given = format!("\"{other}\"");
+            let fix = "smooth.bandwidth = \"wake\"";
+            Err(vec![Problem::error("smooth.bandwidth", given, "accepted: a number (m), or \"wake\"", fix)])
+        }
+    }
 }
 
 fn set(table: &mut toml::Table, key: &str, value: &str) -> Result<(), Vec<Problem>> {

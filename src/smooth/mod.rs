@@ -20,6 +20,7 @@ mod graph;
 mod pcg;
 mod polynomial;
 mod sweep;
+pub mod wake;
 
 pub use active::Active;
 pub use average::TimeAverage;
