@@ -27,7 +27,7 @@ pub fn setup(c: &Config) -> Result<Setup, String> {
         density: f.fluid.density,
         kinematic_viscosity: f.fluid.kinematic_viscosity,
         parcel_factor: 0.05,
-        ratio: f.dem.coarse_graining,
+        ratio: f.dem.coarse_graining.of_all(),
     };
     let stress = forces::parcel::ParticleStress {
         pressure: x.particle_stress,
@@ -55,9 +55,13 @@ pub fn setup(c: &Config) -> Result<Setup, String> {
         voidage_min: f.limits.voidage_min,
         exclude_outside: f.limits.outside == "exclude",
         extra: forces::Extra {
-            ratio: f.dem.coarse_graining,
+            ratio: f.dem.coarse_graining.of_all(),
+            ratio_by_type: f.dem.coarse_graining.by_type(),
             lift: forces::lift::all().iter().copied().find(|l| l.name() == x.lift),
-            added_mass: x.added_mass,
+            added_mass: x.added_mass.coefficient(),
+            felderhof: x.added_mass.law(),
+            history: x.history,
+            torque: x.torque,
             stress: (x.particle_stress > 0.0).then_some(stress),
         },
     })
@@ -91,7 +95,7 @@ pub fn welcome(c: &Config, resume: Option<&State>) -> Welcome {
     set("dem.constant_force", yes(f.dem.force == InInterval::Constant));
     set("coupling.resumed", yes(resume.is_some()));
     set("coupling.first_exchange", resume.map_or(0.0, |s| s.exchange as f64));
-    set("dem.added_mass", f.forces.added_mass * f.fluid.density);
+    set("dem.added_mass", f.forces.added_mass.coefficient() * f.fluid.density);
     set("coupling.interval", f64::from(f.coupling.interval));
     set("fluid.density", f.fluid.density);
     set("fluid.kinematic_viscosity", f.fluid.kinematic_viscosity);
@@ -108,6 +112,11 @@ pub fn welcome(c: &Config, resume: Option<&State>) -> Welcome {
     }
     // what no force and no scheme needs is not sent
     set("send.history", yes(scheme::by_name(&f.coupling.scheme).is_some_and(|s| s.wants_history())));
+    set("send.type", yes(!f.dem.coarse_graining.by_type().is_empty()));
+    set("send.angular_velocity", yes(f.forces.torque));
+    set("drive.added_mass", yes(f.forces.added_mass.law()));
+    set("drive.rotation", yes(f.forces.torque));
+    set("drive.memory", if f.forces.history { forces::history::Memory::WIDTH as f64 } else { 0.0 });
     set("send.pressure_gradient", yes(model_a && f.forces.pressure_gradient));
     set("send.stress_divergence", yes(model_a && f.forces.viscous_stress));
     w

@@ -164,5 +164,6 @@ fn placed(p: &Particles, step: &CouplingStep) -> Particles {
         mass: order.iter().map(|i| p.mass[*i]).collect(),
         totals: p.totals,
         history: p.history.clone(),
+        asked: p.asked.clone(),
     }
 }

@@ -64,10 +64,15 @@ fn values(c: &Config, p: &mut Vec<Problem>) {
     range("fluid.density", f.fluid.density, 1e-2, 3e4, "kg/m3");
     range("fluid.kinematic_viscosity", f.fluid.kinematic_viscosity, 1e-9, 1e2, "m2/s");
     range("dem.time_step", f.dem.time_step, 1e-12, 1.0, "s");
-    range("dem.coarse_graining", f.dem.coarse_graining, 1.0, 1e3, "");
+    match &f.dem.coarse_graining {
+        CoarseGraining::All(ratio) => range("dem.coarse_graining", *ratio, 1.0, 1e3, ""),
+        CoarseGraining::ByType(table) => {
+            table.iter().for_each(|(k, ratio)| range(&format!("dem.coarse_graining.{k}"), *ratio, 1.0, 1e3, ""));
+        }
+    }
     range("forces.sphericity", f.forces.sphericity, 0.1, 1.0, "");
     range("forces.switch_voidage", f.forces.switch_voidage, 0.4, 1.0, "");
-    range("forces.added_mass", f.forces.added_mass, 0.0, 5.0, "");
+    range("forces.added_mass", f.forces.added_mass.coefficient(), 0.0, 5.0, "");
     range("forces.particle_stress", f.forces.particle_stress, 0.0, 1e6, "Pa");
     range("forces.particle_stress_exponent", f.forces.particle_stress_exponent, 1.0, 10.0, "");
     range("forces.close_packing", f.forces.close_packing, 0.3, 1.0, "");
@@ -155,12 +160,12 @@ fn models(c: &Config, p: &mut Vec<Problem>) {
             fix,
         ));
     }
-    if f.forces.added_mass > 0.0 && f.dem.force == InInterval::Constant {
+    if f.forces.added_mass.on() && f.dem.force == InInterval::Constant {
         let accepted =
             "the added mass is part of the particle's inertia: the force cannot be held over the interval";
         p.push(Problem::error(
             "forces.added_mass",
-            f.forces.added_mass,
+            format!("{:?}", f.forces.added_mass),
             accepted,
             "dem.force = \"implicit\"",
         ));

@@ -12,6 +12,7 @@
 
 mod active;
 mod average;
+mod classes;
 pub mod coefficients;
 mod diffusion;
 mod direct;
@@ -24,6 +25,7 @@ pub mod wake;
 
 pub use active::Active;
 pub use average::TimeAverage;
+pub use classes::Classes;
 pub use diffusion::Diffusion;
 pub use direct::Direct;
 pub use field::{Field, Scratch};
