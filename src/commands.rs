@@ -197,7 +197,9 @@ fn exchange(
     let [smoother, positive] = setup::smoothers(config, &mesh)?;
     println!("smoothing: {}, {} sweeps", smoother.name(), smoother.degree());
     let mapping = setup::mapping(config, &mesh)?;
-    let step = CouplingStep::new(mesh, setup::setup(config)?, mapping, smoother, positive);
+    let classes = setup::classes(config, &mesh);
+    let step =
+        CouplingStep::new(mesh, setup::setup(config)?, mapping, smoother, positive).with_classes(classes);
     let file = config.folder.join("monitor.csv");
     let monitor = match &resume {
         None => Monitor::create(&file, false),

@@ -7,7 +7,7 @@ use crate::map::Mapping;
 use crate::mesh::Mesh;
 use crate::output::restart::State;
 use crate::partners::Partners;
-use crate::smooth::{self, Diffusion, Smoother};
+use crate::smooth::{self, Classes, Diffusion, Smoother};
 use crate::step::Setup;
 use crate::{forces, map, scheme};
 use voidage_wire::{Transport, Welcome};
@@ -64,6 +64,7 @@ pub fn setup(c: &Config) -> Result<Setup, String> {
             torque: x.torque,
             stress: (x.particle_stress > 0.0).then_some(stress),
         },
+        average: smooth::TimeAverage::new(c.period(), f.smooth.time),
     })
 }
 
@@ -76,12 +77,22 @@ pub fn mapping(c: &Config, mesh: &Mesh) -> Result<Box<dyn Mapping>, String> {
     Ok(mapping)
 }
 
-/// The smoother asked for and the positive one for redone steps.
+/// Classes of particle sizes.
+pub fn classes(c: &Config, mesh: &Mesh) -> Classes {
+    Classes::new(mesh, &c.file.smooth.by_diameter, c.file.smooth.bandwidth)
+}
+
+/// The smoother asked for and the positive one for redone steps, on the rows of all classes.
 pub fn smoothers(c: &Config, mesh: &Mesh) -> Result<[Box<dyn Smoother>; 2], String> {
     let s = &c.file.smooth;
-    let t = Diffusion::uniform(s.bandwidth).links(mesh);
-    smooth::pair(&s.method, mesh, &t, s.tolerance)
-        .ok_or_else(|| format!("smooth.method = \"{}\" is not known", s.method))
+    let (classes, like) =
+        (classes(c, mesh), Diffusion { largest_cell: s.largest_cell, ..Diffusion::default() });
+    let t = classes.links(mesh, &like);
+    let unknown = || format!("smooth.method = \"{}\" is not known", s.method);
+    if classes.count() == 1 {
+        return smooth::pair(&s.method, mesh, &t, s.tolerance).ok_or_else(unknown);
+    }
+    smooth::pair(&s.method, &classes.mesh(mesh), &t, s.tolerance).ok_or_else(unknown)
 }
 
 /// What the partners are told (names in `docs/wire.md`).

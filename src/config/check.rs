@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! What cannot work, or will surprise: checked across case.toml, the OpenFOAM case and the DEM script.
 
-use super::resolution::{courant, gather_bias, relaxation};
-use super::{Config, Feedback, GravityTreatment, InInterval, Model, Problem, bandwidth, foam, script};
+use super::resolution::{courant, gather_bias, history, relaxation};
+use super::{
+    CoarseGraining, Config, Continuity, Feedback, GravityTreatment, InInterval, Model, Problem, bandwidth,
+    foam, script,
+};
 
 /// All problems of a case, errors first.
 pub fn check(c: &Config) -> Vec<Problem> {
     let mut p = Vec::new();
     values(c, &mut p);
     models(c, &mut p);
+    smoothing(c, &mut p);
     times(c, &mut p);
     let script = script::read(&c.script(), &c.file.dem.variables);
     match &script {
@@ -67,7 +71,9 @@ fn values(c: &Config, p: &mut Vec<Problem>) {
     match &f.dem.coarse_graining {
         CoarseGraining::All(ratio) => range("dem.coarse_graining", *ratio, 1.0, 1e3, ""),
         CoarseGraining::ByType(table) => {
-            table.iter().for_each(|(k, ratio)| range(&format!("dem.coarse_graining.{k}"), *ratio, 1.0, 1e3, ""));
+            table
+                .iter()
+                .for_each(|(k, ratio)| range(&format!("dem.coarse_graining.{k}"), *ratio, 1.0, 1e3, ""));
         }
     }
     range("forces.sphericity", f.forces.sphericity, 0.1, 1.0, "");
@@ -91,6 +97,14 @@ fn values(c: &Config, p: &mut Vec<Problem>) {
     if f.smooth.method != "none" || f.map.method == "kernel" {
         range("smooth.bandwidth", f.smooth.bandwidth, 1e-9, 1e3, "m");
     }
+    for [d, b] in &f.smooth.by_diameter {
+        range("smooth.by_diameter", *d, 1e-9, 1e2, "m (a diameter)");
+        range("smooth.by_diameter", *b, 1e-9, 1e3, "m (a bandwidth)");
+    }
+    if f.smooth.largest_cell != 0.0 {
+        range("smooth.largest_cell", f.smooth.largest_cell, 1e-9, 1e4, "m");
+    }
+    range("smooth.time", f.smooth.time, 0.0, 1e6, "s");
     for (key, n) in [("run.dem_ranks", f.run.dem_ranks), ("run.cfd_ranks", f.run.cfd_ranks)] {
         if n == 0 || n > 100_000 {
             p.push(Problem::error(key, n, "at least 1", format!("{key} = 1")));
@@ -103,6 +117,63 @@ fn values(c: &Config, p: &mut Vec<Problem>) {
             "a number of DEM steps, at least 1",
             "coupling.interval = 20",
         ));
+    }
+    if let CoarseGraining::ByType(table) = &f.dem.coarse_graining {
+        let bad = |k: &&String| !k.parse::<u32>().is_ok_and(|t| (1..1000).contains(&t));
+        if let Some(k) = table.keys().find(bad) {
+            let fix = "dem.coarse_graining = { 1 = 4.0, 2 = 10.0 }";
+            p.push(Problem::error(
+                "dem.coarse_graining",
+                k,
+                "the keys are particle types of the script, from 1",
+                fix,
+            ));
+        }
+        if table.is_empty() {
+            p.push(Problem::error(
+                "dem.coarse_graining",
+                "{}",
+                "no type at all",
+                "dem.coarse_graining = 1.0",
+            ));
+        }
+    }
+}
+
+/// Smoothing beyond one bandwidth for all and the particles of now.
+fn smoothing(c: &Config, p: &mut Vec<Problem>) {
+    let s = &c.file.smooth;
+    let given = || format!("{:?}", s.by_diameter);
+    if !s.by_diameter.is_empty() && s.method == "none" {
+        let fix = "smooth.method = \"chebyshev\"";
+        p.push(Problem::error(
+            "smooth.by_diameter",
+            given(),
+            "nothing is smoothed with method = \"none\"",
+            fix,
+        ));
+    }
+    if s.by_diameter.windows(2).any(|w| w[0][0] >= w[1][0]) {
+        let accepted = "the diameters must ascend: a particle takes the first that is not below its own";
+        let fix = "smooth.by_diameter = [[1e-3, 4e-3], [2e-3, 8e-3]]";
+        p.push(Problem::error("smooth.by_diameter", given(), accepted, fix));
+    }
+    if s.time > 0.0 && c.file.coupling.continuity == Continuity::SolidsFlux {
+        let accepted =
+            "the mean solid fraction and the solids flux of now do not fit each other in the continuity";
+        let fix = "coupling.continuity = \"voidage-rate\"";
+        p.push(Problem::error("smooth.time", s.time, accepted, fix));
+    } else if s.time > 0.0 {
+        let model_a = if c.file.coupling.model == Model::A && c.file.coupling.feedback == Feedback::TwoWay {
+            "; in model A the pressure force then breaks the third law (action_reaction_error)"
+        } else {
+            ""
+        };
+        let accepted = format!(
+            "the mean lags: the fluid does not see the solid volume of now (solid_volume_error of monitor.csv){model_a}"
+        );
+        let fix = "smooth.time = 0, or coupling.model = \"B\"";
+        p.push(Problem::warning("smooth.time", s.time, &accepted, fix));
     }
 }
 
@@ -169,6 +240,11 @@ fn models(c: &Config, p: &mut Vec<Problem>) {
             accepted,
             "dem.force = \"implicit\"",
         ));
+    }
+    if f.forces.drag == "beetstra-filtered" && !f.dem.coarse_graining.by_type().is_empty() {
+        let accepted = "the filtered law's parcel correction knows one ratio for all particles";
+        let fix = "a number for dem.coarse_graining, or another drag law";
+        p.push(Problem::error("dem.coarse_graining", "by type", accepted, fix));
     }
     let scheme = crate::scheme::by_name(&f.coupling.scheme);
     if two_way && scheme.is_some_and(|s| !s.conservative()) {
@@ -266,6 +342,7 @@ fn dem(c: &Config, s: &script::Script, p: &mut Vec<Problem>) {
         bandwidth::advice(c, s, p);
         if let Some(rho) = s.density {
             relaxation(c, r, rho, s.count, p);
+            history(c, r, rho, p);
         }
     }
 }

@@ -114,7 +114,10 @@ fn liggghts() -> String {
 
 /// Parcel diameter / primary diameter.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "dem.coarse_graining: a number, or one for each particle type: { 1 = 4.0, 2 = 10.0 }")]
+#[serde(
+    untagged,
+    expecting = "dem.coarse_graining: a number, or one for each particle type: { 1 = 4.0, 2 = 10.0 }"
+)]
 pub enum CoarseGraining {
     /// of all particles
     All(f64),
@@ -447,7 +450,12 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
         "[]",
         "[[d1, b1], [d2, b2], ...]: particles up to diameter d1 are smoothed with b1 and so on, larger ones with bandwidth",
     ),
-    ("smooth.largest_cell", "m", "0", "cells larger than this (cube root of the volume) are not smoothed; 0: all are"),
+    (
+        "smooth.largest_cell",
+        "m",
+        "0",
+        "cells larger than this (cube root of the volume) are not smoothed; 0: all are",
+    ),
     (
         "smooth.time",
         "s",

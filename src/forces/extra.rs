@@ -105,12 +105,11 @@ impl Extra {
         if self.felderhof { felderhof(solid_fraction, density_ratio) } else { self.added_mass }
     }
 
-    /// Force (N) of each particle of `list` into `out`: lift, C_a ρ V DU/Dt of the added mass, history. `memory`: what the
-    /// history left last time, `keep`: what it leaves now. Particles of one cell should follow each other.
+    /// Force (N) of each particle with a host into `out`: lift, C_a ρ V DU/Dt of the added mass, history. `memory`: what
+    /// the history left last time, `keep`: what it leaves now. Particles of one cell should follow each other.
     pub fn compute(
         &self,
         flow: &Flow,
-        list: &[u32],
         hosts: &[u32],
         each: impl Fn(usize) -> Each,
         memory: &[Memory],
@@ -119,8 +118,7 @@ impl Extra {
     ) {
         let with_gradient = self.lift.is_some() || self.added();
         let (mut last, mut g) = (NONE, [[0.0; 3]; 3]);
-        for i in list.iter().map(|i| *i as usize) {
-            let host = hosts[i];
+        for (i, &host) in hosts.iter().enumerate() {
             if with_gradient && host != last {
                 (last, g) = (host, gradient(flow.mesh, flow.velocity, host as usize));
             }
@@ -149,11 +147,17 @@ impl Extra {
     }
 
     /// Torque K_ω (W − ω) on a particle in a cell where the fluid's velocity gradient is `g`: K_ω (N m s) and W = ½ ∇ × U
-    /// (rad/s); `spin` ω (rad/s).
-    pub fn torque(&self, flow: &Flow, g: &[[f64; 3]; 3], radius: f64, ratio: f64, spin: [f64; 3]) -> (f64, [f64; 3]) {
+    /// (rad/s); `nu` (m2/s), `density` (kg/m3) of the fluid, `spin` ω (rad/s).
+    pub fn torque(
+        (nu, density): (f64, f64),
+        g: &[[f64; 3]; 3],
+        radius: f64,
+        ratio: f64,
+        spin: [f64; 3],
+    ) -> (f64, [f64; 3]) {
         let rotation = curl(g).map(|x| 0.5 * x);
         let slip = [0, 1, 2].map(|a| rotation[a] - spin[a]);
-        let k = rotation::coefficient(2.0 * radius / ratio, slip, flow.kinematic_viscosity, flow.density);
+        let k = rotation::coefficient(2.0 * radius / ratio, slip, nu, density);
         (k * ratio.powi(5), rotation)
     }
 

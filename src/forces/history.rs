@@ -7,7 +7,7 @@
 //! Does not know particles' owners.
 //!
 //! The force is explicit: its newest part, 2 (slip − last slip)/√Δt, acts like an added mass one period late, so it is
-//! stable only while [`explicit_ratio`] < 1.
+//! stable while [`explicit_ratio`] < 1.
 
 use std::f64::consts::{E, PI};
 
@@ -95,7 +95,7 @@ pub fn coefficient(diameter: f64, density: f64, kinematic_viscosity: f64) -> f64
 }
 
 /// What the newest part of the force does to a particle's velocity in one period, over what it answers to: a change of
-/// slip δ changes the velocity by this times δ a period later. Growing oscillations from 1 on.
+/// slip δ changes the velocity by this times δ a period later. Stable below 1 (alone it runs away from 1.3 on).
 pub fn explicit_ratio(diameter: f64, density: f64, particle_density: f64, nu: f64, period: f64) -> f64 {
     let mass = particle_density * PI / 6.0 * diameter.powi(3);
     coefficient(diameter, density, nu) * 2.0 * period.sqrt() / mass
@@ -120,9 +120,9 @@ mod tests {
     fn beyond_a_ratio_of_one_the_explicit_force_runs_away() {
         // m dv/dt = F(−v) alone, started with a kick
         let (d, rho, nu, dt) = (1e-3, 1000.0, 1e-6, 1e-3);
-        for (particle, stable) in [(4000.0, true), (300.0, false)] {
+        for (particle, stable) in [(4000.0, true), (330.0, true), (200.0, false)] {
             let ratio = explicit_ratio(d, rho, particle, nu, dt);
-            assert_eq!(ratio < 1.0, stable, "{ratio}");
+            assert_eq!(ratio < 1.0, stable, "{ratio}"); // runs away from 1.3 on: the older past pulls back
             let (mut h, mut v, mut most) = (History::default(), 1.0f64, 0.0f64);
             h.advance([0.0; 3], dt);
             for _ in 0..200 {

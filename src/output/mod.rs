@@ -17,6 +17,7 @@ use vtk::Data;
 pub struct Output {
     folder: PathBuf,
     cells: Option<vtk::Series>,
+    grid: Option<vtk::Grid>,
     particles: Option<vtk::Series>,
     camera: Option<Camera>,
     suffix: String,
@@ -36,6 +37,7 @@ impl Output {
         let axis = ["x", "y", "z"].iter().position(|a| *a == o.picture);
         Ok(Self {
             cells: series(o.fields, "cells"),
+            grid: None,
             particles: series(o.particles, "particles"),
             camera: axis.map(Camera::new),
             folder,
@@ -55,7 +57,8 @@ impl Output {
                 ("momentum_exchange_coefficient", Data::Scalar(&q.sp)),
                 ("momentum_source", Data::Vector(&q.su)),
             ];
-            series.write(s.time, "vtu", |file| vtk::cells(file, &s.step.mesh, &fields))?;
+            let grid = self.grid.get_or_insert_with(|| vtk::Grid::new(&s.step.mesh));
+            series.write(s.time, "vtu", |file| grid.write(file, &fields))?;
         }
         if let Some(series) = &mut self.particles {
             let d = &s.step.drive;

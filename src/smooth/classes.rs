@@ -51,7 +51,7 @@ impl Classes {
     }
     /// Cell of a row.
     pub fn cell(&self, row: u32) -> usize {
-        row as usize % self.cells
+        if self.count() == 1 { row as usize } else { row as usize % self.cells }
     }
     /// Row of a cell in the class of a particle; no cell stays none.
     pub fn row(&self, cell: u32, radius: f64) -> u32 {

@@ -45,6 +45,7 @@ impl Dem {
             velocity: zero.clone(),
             force: zero.clone(),
             charged: zero.clone(),
+            ..Drive::default()
         };
         let (held, taken) = (vec![false; n], zero.clone());
         Self {
