@@ -165,6 +165,60 @@ fn errors() {
             &["dem.force=constant"],
             &["the constant force errs by 0.6 % of the drag", "dem.force = \"implicit\""],
         ),
+        (
+            BED,
+            &[],
+            &["smooth.by_diameter=[[2e-3, 8e-3], [1e-3, 4e-3]]"],
+            &["smooth.by_diameter = [[0.002, 0.008], [0.001, 0.004]]", "must ascend"],
+        ),
+        (BED, &[], &["smooth.by_diameter=[[2e-3, -1.0]]"], &["smooth.by_diameter = -1", "a bandwidth"]),
+        (SETTLING, &[], &["smooth.by_diameter=[[2e-3, 8e-3]]"], &["nothing is smoothed", "\"chebyshev\""]),
+        (BED, &[], &["smooth.largest_cell=-1.0"], &["smooth.largest_cell = -1", "between"]),
+        (BED, &[], &["smooth.time=-1.0"], &["smooth.time = -1", "between"]),
+        (
+            BED,
+            &[],
+            &["smooth.time=0.1", "coupling.continuity=solids-flux"],
+            &["smooth.time = 0.1", "do not fit", "\"voidage-rate\""],
+        ),
+        (
+            BED,
+            &[],
+            &["dem.coarse_graining={ steel = 2.0 }"],
+            &["dem.coarse_graining = steel", "{ 1 = 4.0, 2 = 10.0 }"],
+        ),
+        (BED, &[], &["dem.coarse_graining={ 1 = 0.5 }"], &["dem.coarse_graining.1 = 0.5", "between"]),
+        (
+            BED,
+            &[],
+            &["dem.coarse_graining=big"],
+            &["dem.coarse_graining: a number, or one for each particle type"],
+        ),
+        (
+            BED,
+            &[],
+            &[
+                "dem.coarse_graining={ 1 = 2.0 }",
+                "forces.drag=beetstra-filtered",
+                "forces.filter_diameter=1e-3",
+                "forces.filter_density=1000.0",
+            ],
+            &["dem.coarse_graining = by type", "one ratio for all"],
+        ),
+        (
+            BED,
+            &[],
+            &["forces.added_mass=felderhoff"],
+            &["forces.added_mass = \"felderhoff\"", "forces.added_mass = \"felderhof\"?"],
+        ),
+        (BED, &[], &["forces.torque=much"], &["invalid type", "expected a boolean"]),
+        // 18/√π 1000/3000 √(1e-5 2e-4)/1e-4
+        (
+            SETTLING,
+            &[],
+            &["forces.history=true", "fluid.density=1000.0"],
+            &["forces.history = true", "by 1.51 of it", "a fluid step of at most 2.2e-5 s"],
+        ),
         (SETTLING, &[], &["fluid.case=nowhere"], &["fluid.case = nowhere", "controlDict"]),
     ];
     for (i, (case, edits, set, says)) in table.iter().enumerate() {
@@ -232,6 +286,21 @@ fn warnings() {
             &["tau_f: explicit coupling may be unstable", "R eq. 10"],
         ),
     ];
+    let more: &[Message] = &[
+        (
+            BED,
+            &[],
+            &["smooth.time=0.1"],
+            &["smooth.time = 0.1", "solid_volume_error", "breaks the third law"],
+        ),
+        (
+            SETTLING,
+            &[],
+            &["forces.history=true", "fluid.density=400.0"],
+            &["forces.history = true", "0.61 of it"],
+        ),
+    ];
+    let table = [table, more].concat();
     for (i, (case, edits, set, says)) in table.iter().enumerate() {
         let (_, text) = check(&format!("w{i}"), case, edits, set);
         let lines: Vec<&str> = text.lines().filter(|l| l.starts_with("warning:")).collect();
