@@ -105,7 +105,12 @@ fn values(c: &Config, p: &mut Vec<Problem>) {
         range("smooth.largest_cell", f.smooth.largest_cell, 1e-9, 1e4, "m");
     }
     range("smooth.time", f.smooth.time, 0.0, 1e6, "s");
-    for (key, n) in [("run.dem_ranks", f.run.dem_ranks), ("run.cfd_ranks", f.run.cfd_ranks)] {
+    let counts = [
+        ("run.dem_ranks", f.run.dem_ranks),
+        ("run.cfd_ranks", f.run.cfd_ranks),
+        ("run.threads", f.run.threads),
+    ];
+    for (key, n) in counts {
         if n == 0 || n > 100_000 {
             p.push(Problem::error(key, n, "at least 1", format!("{key} = 1")));
         }
