@@ -578,12 +578,13 @@ impl CouplingStep {
             let inner = if s.pressure_force { [3, 4, 5].map(|a| -v * g[a]) } else { [0.0; 3] };
             let force = [0, 1, 2].map(|a| inner[a] + outer[a]);
             let slip = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
+            let external = outer.map(|x| s.period * x);
+            // exchange 0: no fluid step bears the interval, the ledger does; but not what has no reaction
             let charged = if first {
-                [0.0; 3]
+                external
             } else {
                 [0, 1, 2].map(|a| s.period * (q.implicit * slip[a] + q.explicit[a] + force[a]))
             };
-            let external = if first { [0.0; 3] } else { outer.map(|x| s.period * x) };
             let old = ledger(i);
             scale.add(norm([0, 1, 2].map(|a| charged[a] + old[a])));
             for a in 0..3 {
