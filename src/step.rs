@@ -655,13 +655,13 @@ impl CouplingStep {
                     let inner = if s.pressure_force { [3, 4, 5].map(|a| -v * g[a]) } else { [0.0; 3] };
                     let force = [0, 1, 2].map(|a| inner[a] + outer[a]);
                     let slip = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
-                    let mut charged = [0.0; 3];
-                    let mut external = [0.0; 3];
-                    if !first {
-                        charged =
-                            [0, 1, 2].map(|a| s.period * (q.implicit * slip[a] + q.explicit[a] + force[a]));
-                        external = outer.map(|x| s.period * x);
-                    }
+                    let external = outer.map(|x| s.period * x);
+                    // exchange 0: no fluid step bears the interval, the ledger does; but not what has no reaction
+                    let charged = if first {
+                        external
+                    } else {
+                        [0, 1, 2].map(|a| s.period * (q.implicit * slip[a] + q.explicit[a] + force[a]))
+                    };
                     let (j, l, e) = (charged, ledger(i), external);
                     let size = norm([0, 1, 2].map(|a| j[a] + l[a]));
                     sums.add([j[0], j[1], j[2], l[0], l[1], l[2], e[0], e[1], e[2], size]);
