@@ -197,9 +197,10 @@ fn exchange(
     let [smoother, positive] = setup::smoothers(config, &mesh)?;
     println!("smoothing: {}, {} sweeps", smoother.name(), smoother.degree());
     let mapping = setup::mapping(config, &mesh)?;
-    let classes = setup::classes(config, &mesh);
-    let step =
-        CouplingStep::new(mesh, setup::setup(config)?, mapping, smoother, positive).with_classes(classes);
+    let (classes, pinned) = (setup::classes(config, &mesh), setup::pinned(config, &mesh));
+    let step = CouplingStep::new(mesh, setup::setup(config)?, mapping, smoother, positive)
+        .with_classes(classes)
+        .with_pinned(pinned);
     let file = config.folder.join("monitor.csv");
     let monitor = match &resume {
         None => Monitor::create(&file, false),

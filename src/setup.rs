@@ -7,7 +7,7 @@ use crate::map::Mapping;
 use crate::mesh::Mesh;
 use crate::output::restart::State;
 use crate::partners::Partners;
-use crate::smooth::{self, Classes, Diffusion, Smoother};
+use crate::smooth::{self, Classes, Diffusion, Pinned, Smoother};
 use crate::step::Setup;
 use crate::{forces, map, scheme};
 use voidage_wire::{Transport, Welcome};
@@ -87,6 +87,13 @@ pub fn mapping(c: &Config, mesh: &Mesh) -> Result<Box<dyn Mapping>, String> {
 /// Classes of particle sizes.
 pub fn classes(c: &Config, mesh: &Mesh) -> Classes {
     Classes::new(mesh, &c.file.smooth.by_diameter, c.file.smooth.bandwidth)
+}
+
+/// R's continuation of the solids velocity, if it is asked for.
+pub fn pinned(c: &Config, mesh: &Mesh) -> Option<Pinned> {
+    let s = &c.file.smooth;
+    let t = Diffusion { bandwidth: s.bandwidth, largest_cell: s.largest_cell, ..Diffusion::default() };
+    (c.file.coupling.void_velocity == "pinned").then(|| Pinned::new(mesh, &t.links(mesh)))
 }
 
 /// The smoother asked for and the positive one for redone steps, on the rows of all classes.

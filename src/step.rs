@@ -18,7 +18,7 @@ use crate::map::{Mapping, Weights};
 use crate::mesh::{Mesh, NONE};
 use crate::particles::{Particles, Spare};
 use crate::scheme::{Before, Cells, Scheme};
-use crate::smooth::{Active, Classes, Direction, Field, Scratch, Smoother, TimeAverage};
+use crate::smooth::{Active, Classes, Direction, Field, Pinned, Scratch, Smoother, TimeAverage};
 use crate::sums::{self, Sums, norm};
 use crate::threads;
 use std::time::Instant;
@@ -263,6 +263,8 @@ pub struct CouplingStep {
     /// ε_s and ε_s U_s as mapped and as smoothed, for schemes that want them
     mapped: Vec<Lanes>,
     smoothed: Vec<Lanes>,
+    /// continues the solids velocity into void cells, for schemes that want it so
+    pinned: Option<Pinned>,
     /// Voidage and sources of this step.
     pub sources: Sources,
     /// Reply to the DEM.
@@ -321,6 +323,7 @@ impl CouplingStep {
             fluid_before: Vec::new(),
             mapped: Vec::new(),
             smoothed: Vec::new(),
+            pinned: None,
             sources: Sources {
                 voidage: vec![1.0; n],
                 voidage_old: vec![1.0; n],
@@ -348,6 +351,11 @@ impl CouplingStep {
         self.scratch = Scratch::new(classes.rows());
         self.classes = classes;
         self
+    }
+
+    /// The solids velocity of void cells is continued from the filled ones, which are held fixed.
+    pub fn with_pinned(self, pinned: Option<Pinned>) -> Self {
+        Self { pinned, ..self }
     }
 
     /// Puts the voidage and the fluid velocity at the start of the coming step (restart).
@@ -628,7 +636,9 @@ impl CouplingStep {
         });
         let positive = positive.iter().all(|p| *p);
         if !scheme.conservative() {
+            let pinned = self.pinned.as_mut().filter(|_| scheme.wants_solids());
             let cells = Cells {
+                pinned: pinned.map(|p| p.solve(&self.mapped)),
                 smoothed: lanes,
                 solids: &self.smoothed,
                 mapped: &self.mapped,
@@ -833,13 +843,13 @@ impl CouplingStep {
                     let inner = if s.pressure_force { [3, 4, 5].map(|a| -v * g[a]) } else { [0.0; 3] };
                     let force = [0, 1, 2].map(|a| inner[a] + outer[a]);
                     let slip = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
-                    let mut charged = [0.0; 3];
-                    let mut external = [0.0; 3];
-                    if !first {
-                        charged =
-                            [0, 1, 2].map(|a| s.period * (q.implicit * slip[a] + q.explicit[a] + force[a]));
-                        external = outer.map(|x| s.period * x);
-                    }
+                    let external = outer.map(|x| s.period * x);
+                    // exchange 0: no fluid step bears the interval, the ledger does; but not what has no reaction
+                    let charged = if first {
+                        external
+                    } else {
+                        [0, 1, 2].map(|a| s.period * (q.implicit * slip[a] + q.explicit[a] + force[a]))
+                    };
                     let (j, l, e) = (charged, ledger(i), external);
                     let size = norm([0, 1, 2].map(|a| j[a] + l[a]));
                     sums.add([j[0], j[1], j[2], l[0], l[1], l[2], e[0], e[1], e[2], size]);

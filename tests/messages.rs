@@ -173,6 +173,19 @@ fn errors() {
         ),
         (BED, &[], &["smooth.by_diameter=[[2e-3, -1.0]]"], &["smooth.by_diameter = -1", "a bandwidth"]),
         (SETTLING, &[], &["smooth.by_diameter=[[2e-3, 8e-3]]"], &["nothing is smoothed", "\"chebyshev\""]),
+        (
+            BED,
+            &[],
+            &["coupling.void_velocity=pinned"],
+            &["coupling.void_velocity = pinned", "coupling.scheme = \"implicit\""],
+        ),
+        (
+            SETTLING,
+            &[],
+            &["coupling.void_velocity=pinned", "coupling.scheme=implicit"],
+            &["coupling.void_velocity = pinned", "nothing is smoothed"],
+        ),
+        (BED, &[], &["coupling.void_velocity=pined"], &["accepted: kernel, pinned", "\"pinned\"?"]),
         (BED, &[], &["smooth.largest_cell=-1.0"], &["smooth.largest_cell = -1", "between"]),
         (BED, &[], &["smooth.time=-1.0"], &["smooth.time = -1", "between"]),
         (

@@ -163,6 +163,21 @@ fn smoothing(c: &Config, p: &mut Vec<Problem>) {
         let fix = "smooth.by_diameter = [[1e-3, 4e-3], [2e-3, 8e-3]]";
         p.push(Problem::error("smooth.by_diameter", given(), accepted, fix));
     }
+    let x = &c.file.coupling;
+    if x.void_velocity == "pinned" && (x.scheme != "implicit" || s.method == "none") {
+        let (accepted, fix) = if x.scheme == "implicit" {
+            (
+                "nothing is smoothed with method = \"none\": no void cell has a source",
+                "smooth.method = \"chebyshev\"",
+            )
+        } else {
+            (
+                "only the scheme implicit looks at the solids velocity of void cells",
+                "coupling.scheme = \"implicit\"",
+            )
+        };
+        p.push(Problem::error("coupling.void_velocity", "pinned", accepted, fix));
+    }
     if s.time > 0.0 && c.file.coupling.continuity == Continuity::SolidsFlux {
         let accepted =
             "the mean solid fraction and the solids flux of now do not fit each other in the continuity";

@@ -223,6 +223,9 @@ fn model_a() -> Model {
 fn two_way() -> Feedback {
     Feedback::TwoWay
 }
+fn kernel() -> String {
+    "kernel".into()
+}
 fn voidage_rate() -> Continuity {
     Continuity::VoidageRate
 }
@@ -241,6 +244,8 @@ pub struct Coupling {
     pub feedback: Feedback,
     #[serde(default = "voidage_rate")]
     pub continuity: Continuity,
+    #[serde(default = "kernel")]
+    pub void_velocity: String,
 }
 
 /// Section `map`.
@@ -425,6 +430,12 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("coupling.model", "", "A", "A | B: split of pressure gradient and stress"),
     ("coupling.feedback", "", "two-way", "two-way | one-way"),
     ("coupling.continuity", "", "voidage-rate", "voidage-rate (d eps/dt) | solids-flux (SX eq. 2a)"),
+    (
+        "coupling.void_velocity",
+        "",
+        "kernel",
+        "implicit: solids velocity of cells void of particles: kernel (mean) | pinned (continued from filled cells held fixed, R)",
+    ),
     (
         "map.method",
         "",
@@ -623,6 +634,7 @@ fn names(file: &CaseFile) -> Vec<Problem> {
     let lifts = ["none"].into_iter().chain(forces::lift::all().iter().map(|l| l.name()));
     check("forces.lift", &file.forces.lift, lifts.collect());
     check("coupling.scheme", &file.coupling.scheme, scheme::all().iter().map(|s| s.name()).collect());
+    check("coupling.void_velocity", &file.coupling.void_velocity, vec!["kernel", "pinned"]);
     check("map.method", &file.map.method, map::all().iter().map(|m| m.name()).collect());
     check("smooth.method", &file.smooth.method, smooth::NAMES.to_vec());
     check("interpolate.fluid_velocity", &file.interpolate.fluid_velocity, FluidVelocity::NAMES.to_vec());

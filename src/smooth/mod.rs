@@ -19,6 +19,7 @@ mod direct;
 mod field;
 mod graph;
 mod pcg;
+mod pinned;
 mod polynomial;
 mod sweep;
 pub mod wake;
@@ -31,6 +32,7 @@ pub use direct::Direct;
 pub use field::{Field, Scratch};
 pub use graph::Graph;
 pub use pcg::Implicit;
+pub use pinned::Pinned;
 pub use polynomial::{Polynomial, Single};
 
 use crate::mesh::Mesh;
