@@ -190,7 +190,8 @@ fn smoothing(c: &Config, p: &mut Vec<Problem>) {
             ""
         };
         let accepted = format!(
-            "the mean lags: the fluid does not see the solid volume of now (solid_volume_error of monitor.csv){model_a}"
+            "the mean lags: fluid and drag see the solids where they were, and their volume is kept only while none comes or goes \
+             (solid_volume_error of monitor.csv){model_a}"
         );
         let fix = "smooth.time = 0, or coupling.model = \"B\"";
         p.push(Problem::warning("smooth.time", s.time, &accepted, fix));

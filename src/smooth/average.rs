@@ -3,8 +3,8 @@
 //! α = 1/(1 + Δt/b_t), first order in Δt/b_t.
 //!
 //! The step applies it to ε_s after smoothing in space; the last mean is one minus the last voidage, so nothing else is
-//! kept, restarted or recorded. What it does to conservation: Σ V ⟨ε_s⟩ is that of the past b_t, not of the particles of
-//! now (`solid_volume_error` of monitor.csv); it is theirs again where the bed rests. Sp, Su and the gather are not averaged:
+//! kept, restarted or recorded. What it does to conservation: the solids are where they were over the past b_t; their
+//! volume is kept while none comes or goes (`solid_volume_error` of monitor.csv tells when not). Sp, Su and the gather are not averaged:
 //! drag and every explicit force keep action = −reaction. In model A the fluid has −⟨ε_s⟩(∇p − ∇·τ), the particles the share of
 //! the ε_s of now: the difference is the third law's error (`action_reaction_error`). Model B has no such term. The mean
 //! ε_s and its rate fit each other in the fluid's continuity; a solids flux of now would not fit them.

@@ -7,7 +7,7 @@
 //! M-matrix: values lie between zero and those of the filled cells around, and fall off as e^{−x/√T}.
 //!
 //! Not conservative and not self-adjoint: a velocity is continued, not a momentum. It serves the scheme `implicit` only,
-//! whose third-law error is measured. Conjugate gradients with the diagonal as preconditioner, to 1e-10, from zero each
+//! whose third-law error is measured. Conjugate gradients with the diagonal as preconditioner, to 1e-8, from zero each
 //! time (nothing is kept), three components together, sums in the order of the cells. The filled cells
 //! change from step to step, so a factorisation would have to be made anew each time: it is the oracle of the tests.
 
@@ -17,7 +17,7 @@ use crate::step::Lanes;
 type V = [f64; 3];
 
 /// Residual at which a solve ends, relative to the first.
-const TOLERANCE: f64 = 1e-10;
+const TOLERANCE: f64 = 1e-8;
 /// Iterations after which it ends anyway.
 const LIMIT: usize = 1000;
 
@@ -29,6 +29,8 @@ pub struct Pinned {
     /// T |S|/d, m3
     conductance: Vec<f64>,
     volume: Vec<f64>,
+    /// V + Σ T |S|/d, m3
+    diagonal: Vec<f64>,
     filled: Vec<bool>,
     velocity: Vec<V>,
     residual: Vec<V>,
@@ -42,11 +44,15 @@ impl Pinned {
     /// `diffusion`: T of each link of the mesh, m2.
     pub fn new(mesh: &Mesh, diffusion: &[f64]) -> Self {
         let n = mesh.len();
+        let conductance: Vec<f64> = mesh.links.iter().zip(diffusion).map(|(l, t)| t * l.weight).collect();
+        let range = |i: usize| mesh.link_start[i] as usize..mesh.link_start[i + 1] as usize;
+        let diagonal = (0..n).map(|i| mesh.volume[i] + conductance[range(i)].iter().sum::<f64>()).collect();
         Self {
             start: mesh.link_start.clone(),
             to: mesh.links.iter().map(|l| l.to).collect(),
-            conductance: mesh.links.iter().zip(diffusion).map(|(l, t)| t * l.weight).collect(),
+            conductance,
             volume: mesh.volume.clone(),
+            diagonal,
             filled: vec![false; n],
             velocity: vec![[0.0; 3]; n],
             residual: vec![[0.0; 3]; n],
@@ -56,11 +62,6 @@ impl Pinned {
         }
     }
 
-    /// V + Σ T |S|/d of a row.
-    fn diagonal(&self, i: usize) -> f64 {
-        let range = self.start[i] as usize..self.start[i + 1] as usize;
-        self.volume[i] + self.conductance[range].iter().sum::<f64>()
-    }
     /// A x of a row; `x` of all cells.
     fn row(&self, i: usize, x: &[V]) -> V {
         let mut sum = x[i].map(|x| self.volume[i] * x);
@@ -82,13 +83,13 @@ impl Pinned {
         for i in 0..n {
             let r = self.row(i, &self.velocity);
             self.residual[i] = if self.filled[i] { [0.0; 3] } else { r.map(|x| -x) };
-            let d = self.diagonal(i);
+            let d = self.diagonal[i];
             self.direction[i] = self.residual[i].map(|r| r / d);
         }
         let scaled = |s: &Self| {
             let mut sum = [0.0; 3];
             for i in 0..n {
-                let d = s.diagonal(i);
+                let d = s.diagonal[i];
                 (0..3).for_each(|a| sum[a] += s.residual[i][a] * s.residual[i][a] / d);
             }
             sum
@@ -116,7 +117,7 @@ impl Pinned {
             let next = scaled(self);
             let beta = [0, 1, 2].map(|a| ratio(next[a], rho[a]));
             for i in 0..n {
-                let d = self.diagonal(i);
+                let d = self.diagonal[i];
                 for a in 0..3 {
                     self.direction[i][a] = self.residual[i][a] / d + beta[a] * self.direction[i][a];
                 }
@@ -155,7 +156,7 @@ mod tests {
         for (j, u) in u.iter().enumerate() {
             let k = ((mesh.centre[j][0] - 0.0995) / 1e-3).round();
             let expected = if k < 0.5 { 1.0 } else { q.powf(k) };
-            assert!((u[0] - 2.0 * expected).abs() < 1e-9 && (u[1] + expected).abs() < 1e-9, "{k}: {u:?}");
+            assert!((u[0] - 2.0 * expected).abs() < 1e-7 && (u[1] + expected).abs() < 1e-7, "{k}: {u:?}");
             assert_eq!(u[2], 0.0);
         }
     }
@@ -190,9 +191,9 @@ mod tests {
         let x = lu.solve(&Mat::from_fn(n, 3, |i, a| if field[i][0] > 0.0 { value(i, a) } else { 0.0 }));
         let size = n as f64;
         for i in 0..n {
-            (0..3).for_each(|a| assert!((got[i][a] - x[(i, a)]).abs() < 1e-8 * size, "{i} {a}"));
+            (0..3).for_each(|a| assert!((got[i][a] - x[(i, a)]).abs() < 1e-7 * size, "{i} {a}"));
             // between zero and the extremes of the filled cells
-            assert!(got[i][1] >= -3.0 - 1e-9 && got[i][1] <= 1e-9);
+            assert!(got[i][1] >= -3.0 - 1e-6 && got[i][1] <= 1e-6);
         }
     }
 
