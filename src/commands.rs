@@ -288,7 +288,7 @@ pub fn explain(topic: &str) -> u8 {
 }
 
 /// `voidage bench`
-pub fn bench(json: Option<&Path>, quick: bool) -> u8 {
+pub fn bench(json: Option<&Path>, plot: Option<&Path>, quick: bool) -> u8 {
     let report = match crate::bench::report::run(quick, |what| eprintln!("{what}")) {
         Ok(r) => r,
         Err(e) => {
@@ -297,15 +297,20 @@ pub fn bench(json: Option<&Path>, quick: bool) -> u8 {
         }
     };
     println!("{}", report.table());
-    let Some(file) = json else { return OK };
-    let text = serde_json::to_string_pretty(&report).map_err(|e| e.to_string());
-    match text.and_then(|t| std::fs::write(file, t + "\n").map_err(|e| e.to_string())) {
-        Ok(()) => OK,
+    let write = |option: &str, file: &Path, text: String| {
+        let done = std::fs::write(file, text);
+        done.map_err(|e| eprintln!("error: {option} {}: {e}", file.display())).is_ok()
+    };
+    let text = match serde_json::to_string_pretty(&report) {
+        Ok(t) => t + "\n",
         Err(e) => {
-            eprintln!("error: --json {}: {e}", file.display());
-            FAILED
+            eprintln!("error: --json: {e}");
+            return FAILED;
         }
-    }
+    };
+    let written = json.is_none_or(|file| write("--json", file, text))
+        & plot.is_none_or(|file| write("--plot", file, report.plot()));
+    if written { OK } else { FAILED }
 }
 
 /// `voidage version`
