@@ -40,4 +40,5 @@ pub mod launch;
 pub mod monitor;
 pub mod output;
 pub mod partners;
+pub mod record;
 pub mod setup;

@@ -53,6 +53,23 @@ enum Command {
         #[arg(long)]
         restart: Option<PathBuf>,
     },
+    /// Runs the coupling step on a recording, without the partners, and compares its replies with those recorded
+    Replay {
+        /// recording (made by `voidage run CASE --set record.every=1`)
+        file: PathBuf,
+        /// override a setting of the recorded case: section.key=value (repeatable)
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        set: Vec<String>,
+        /// compare with the replies in this recording instead
+        #[arg(long, value_name = "FILE2")]
+        compare: Option<PathBuf>,
+        /// record the replay
+        #[arg(long, value_name = "FILE")]
+        save: Option<PathBuf>,
+        /// threads of the smoother; 0: one per core
+        #[arg(long, default_value_t = 0)]
+        threads: usize,
+    },
     /// Prints the reference of case.toml, or of monitor.csv
     Explain {
         /// case or monitor
@@ -84,6 +101,9 @@ fn main() -> ExitCode {
         Command::Run { case, into, set, restart } => commands::run(&case, into.as_deref(), &set, restart),
         Command::Check { case, set } => commands::check(&case, &set),
         Command::Couple { case, resolved, restart } => commands::couple(&case, resolved, restart.as_deref()),
+        Command::Replay { file, set, compare, save, threads } => {
+            commands::record::replay(&file, &set, compare.as_deref(), save.as_deref(), threads)
+        }
         Command::Explain { topic } => commands::explain(&topic),
         Command::Bench { json, quick } => commands::bench(json.as_deref(), quick),
         Command::Version => commands::version(),

@@ -10,7 +10,7 @@ mod raw;
 mod resolution;
 pub mod script;
 
-pub use check::check;
+pub use check::{check, settings};
 use raw::parse;
 pub use raw::*;
 
@@ -116,4 +116,13 @@ pub fn load(folder: &Path, overrides: &[(String, String)]) -> Result<Config, Vec
         vec![Problem::error("fluid.case", file.fluid.case.display(), &e, fix)]
     })?;
     Ok(Config { folder, file, control })
+}
+
+/// The case of a recording: its text, with overrides; `control` as it ran. Paths lead nowhere.
+pub fn recorded(
+    text: &str,
+    overrides: &[(String, String)],
+    control: foam::Control,
+) -> Result<Config, Vec<Problem>> {
+    Ok(Config { folder: PathBuf::new(), file: parse(text, overrides)?, control })
 }
