@@ -35,8 +35,8 @@ fn count(s: &Selection) -> (u64, u64) {
 pub fn of(c: &Config, particles: u64, cells: u64) -> Forecast {
     let told = setup::welcome(c, None).settings;
     let on = |key: &str| u64::from(told.get(key).is_some_and(|v| *v > 0.0));
-    // id, x, v, ledger, r, m; K, u, f, charged back
-    let particle = 8 * (1 + 3 + 3 + 3 + 1 + 1 + 13 * on("send.history") + 1 + 3 + 3 + 3);
+    // id, type, x, v, r, m, ω, impulse, ledger; K, u, f, charged back
+    let particle = 8 * (1 + 1 + 3 + 3 + 1 + 1 + 3 + 3 + 3 + 10 * on("send.history") + 1 + 3 + 3 + 3);
     // U and what is sent beside; ε, ε old, Sp, Su, ε_s U_s back
     let cell = 8
         * (3 + 3 * on("send.pressure_gradient") + 3 * on("send.stress_divergence") + 6

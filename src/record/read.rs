@@ -206,7 +206,10 @@ impl<R: Read + Seek> Reader<R> {
                     let at = early.filter(|e| e.0 == k).map_or(offset, |e| e.1);
                     list.push((k, at));
                 }
-                Head::Index => return Err(RecordError::Damaged { offset, what: "no end mark follows".into() }),
+                Head::Index => {
+                    self.end = Some(End::Cut(offset));
+                    break;
+                }
                 _ => {}
             }
             let next = self.at + header.stored;

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Recordings: what was recorded replays to the bit, damaged files are errors, settings can be changed.
+
+mod common;
+
+use common::partners::{case, record};
+use std::io::Cursor;
+use std::path::PathBuf;
+use voidage::config::Compression;
+use voidage::record::moment::Moments;
+use voidage::record::replay::{Options, Outcome, ReplayError, replay};
+use voidage::record::{End, Reader, RecordError};
+
+/// A file in a scratch folder, removed at the end.
+struct Scratch(PathBuf);
+impl Scratch {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("voidage-recording-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_file(&path);
+        Self(path)
+    }
+    fn bytes(&self) -> Vec<u8> {
+        std::fs::read(&self.0).unwrap()
+    }
+}
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+type Bytes = Cursor<Vec<u8>>;
+
+fn recorded(name: &str, set: &[(&str, &str)], steps: i64, ranks: [usize; 2]) -> Vec<u8> {
+    let s = Scratch::new(name);
+    record(&s.0, &case(set, steps), steps, ranks, Compression::Lz4);
+    s.bytes()
+}
+
+fn open(bytes: &[u8]) -> Result<Reader<Bytes>, RecordError> {
+    Reader::new(Cursor::new(bytes.to_vec()), "bytes")
+}
+
+fn again(bytes: &[u8], set: &[(&str, &str)]) -> Result<Outcome, ReplayError> {
+    let overrides: Vec<_> = set.iter().map(|(k, v)| ((*k).to_string(), (*v).to_string())).collect();
+    let options = Options { overrides: &overrides, reference: None, save: None };
+    replay(open(bytes)?, options, &mut |_| {})
+}
+
+const ALL: &[(&str, &str)] = &[("record.every", "1")];
+
+#[test]
+fn a_run_replays_to_the_bit_on_any_number_of_threads() {
+    let bytes = recorded("threads", ALL, 8, [2, 2]);
+    for threads in [1, 4] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let o = pool.install(|| again(&bytes, &[])).unwrap();
+        assert_eq!((o.exchanges, o.range, o.cut), (9, Some((0, 8)), None));
+        assert!(o.comparison.identical(), "{}", o.comparison);
+        assert!(o.comparison.arrays.len() == 8, "{}", o.comparison);
+        assert!(o.comparison.arrays.values().all(|d| d.values > 1000));
+    }
+}
+
+#[test]
+fn exchanges_without_their_predecessor_replay_to_the_bit() {
+    let set = &[("record.every", "3"), ("record.last", "2"), ("forces.added_mass", "0.5"), ("forces.lift", "loth")];
+    let bytes = recorded("every", set, 11, [2, 1]);
+    let mut r = open(&bytes).unwrap();
+    let (list, end) = r.exchanges().unwrap();
+    assert_eq!(list.iter().map(|e| e.0).collect::<Vec<_>>(), [0, 3, 6, 9, 10, 11]);
+    assert_eq!(end, End::Whole);
+    let o = again(&bytes, &[]).unwrap();
+    assert!(o.exchanges == 6 && o.comparison.identical(), "{}", o.comparison);
+    // the state matters: another scheme of the same recording differs
+    let o = again(&bytes, &[("forces.added_mass", "0.4")]).unwrap();
+    assert!(o.exchanges == 6 && !o.comparison.identical());
+}
+
+#[test]
+fn other_settings_are_replayed_and_their_difference_is_told() {
+    let bytes = recorded("override", ALL, 4, [1, 1]);
+    let o = again(&bytes, &[("smooth.method", "direct"), ("smooth.tolerance", "1e-12")]).unwrap();
+    let e = o.comparison.arrays[&voidage_wire::field::VOIDAGE].relative();
+    assert!(e > 1e-9 && e < 1e-2, "{}", o.comparison);
+    // the replay, saved, is a recording whose replies are those of the other settings
+    let s = Scratch::new("saved");
+    let overrides = vec![("smooth.method".to_string(), "direct".to_string())];
+    let save = Some((s.0.as_path(), Compression::None));
+    let options = Options { overrides: &overrides, reference: None, save };
+    let first = replay(open(&bytes).unwrap(), options, &mut |_| {}).unwrap();
+    assert!(!first.comparison.identical());
+    let o = again(&s.bytes(), &[]).unwrap();
+    assert!(o.exchanges == 5 && o.comparison.identical(), "{}", o.comparison);
+    let reference = Some(Moments::new(open(&bytes).unwrap()).unwrap());
+    let options = Options { overrides: &[], reference, save: None };
+    let o = replay(open(&s.bytes()).unwrap(), options, &mut |_| {}).unwrap();
+    let (a, b) = (&o.comparison.arrays, &first.comparison.arrays);
+    assert!(a.iter().zip(b).all(|(a, b)| a.1.differing == b.1.differing && a.1.largest == b.1.largest));
+}
+
+#[test]
+fn recordings_of_other_ranks_are_compared_by_cell_and_particle() {
+    let (one, two) = (recorded("one", ALL, 1, [1, 1]), recorded("two", ALL, 1, [3, 2]));
+    let reference = Some(Moments::new(open(&two).unwrap()).unwrap());
+    let options = Options { overrides: &[], reference, save: None };
+    let o = replay(open(&one).unwrap(), options, &mut |_| {}).unwrap();
+    assert!(o.exchanges == 2 && o.comparison.identical(), "{}", o.comparison);
+}
+
+#[test]
+fn what_a_replay_cannot_change_is_refused() {
+    let bytes = recorded("refused", &[("record.first", "2"), ("coupling.model", "B"), ("forces.pressure_gradient", "false"), ("forces.viscous_stress", "false")], 3, [1, 1]);
+    for (set, words) in [
+        (("coupling.interval", "40"), "how the recorded programs ran"),
+        (("output.picture", "x"), "how the recorded programs ran"),
+        (("smooth.bandwith", "1e-3"), "did you mean smooth.bandwidth"),
+        (("smooth.bandwidth", "0"), "smooth.bandwidth"),
+        (("forces.drag", "wen"), "forces.drag = \"wen-yu\""),
+        (("coupling.scheme", "conservative-adaptive"), "need the history, which the recorded programs did not send"),
+    ] {
+        let e = again(&bytes, &[set]).unwrap_err().to_string();
+        assert!(e.contains(words), "{set:?}: {e}");
+    }
+    let a = [("coupling.model", "A"), ("forces.pressure_gradient", "true"), ("forces.viscous_stress", "true")];
+    let e = again(&bytes, &a).unwrap_err().to_string();
+    assert!(e.contains("need the pressure gradient"), "{e}");
+    let o = again(&bytes, &[]).unwrap();
+    assert!(o.exchanges == 2 && o.comparison.identical());
+}
+
+/// Reads all of a file in every way there is; what it comes to. Must not panic.
+fn read_all(bytes: &[u8]) -> Result<(u64, Option<u64>), ReplayError> {
+    let mut m = Moments::new(open(bytes)?)?;
+    for n in 0..m.exchanges.len() {
+        if let Some(x) = m.at(n)? {
+            x.particles()?;
+            x.fluid(&m.mesh)?;
+            x.sources(&m.mesh)?;
+        }
+    }
+    let o = again(bytes, &[])?;
+    assert!(o.comparison.identical(), "damage went unnoticed: {}", o.comparison);
+    Ok((o.exchanges, o.cut))
+}
+
+#[test]
+fn a_file_cut_anywhere_is_read_to_its_last_whole_exchange() {
+    let bytes = recorded("cut", ALL, 3, [1, 1]);
+    let (list, _) = open(&bytes).unwrap().exchanges().unwrap();
+    let mut seed = 3;
+    let mut cuts: Vec<usize> = (0..60).map(|_| (common::random(&mut seed) * bytes.len() as f64) as usize).collect();
+    cuts.extend([0, 1, 15, 16, 17, 63, 64, bytes.len() - 1, bytes.len() - 24, bytes.len() - 25]);
+    for e in &list {
+        cuts.extend([e.1 as usize - 1, e.1 as usize, e.1 as usize + 1]);
+    }
+    let mut seen = [0; 2];
+    for cut in cuts {
+        match read_all(&bytes[..cut]) {
+            Ok((n, at)) => {
+                // an exchange is whole once its replies are in the file
+                let begun = list.iter().filter(|e| e.1 < cut as u64).count() as u64;
+                assert!(n == begun || n + 1 == begun, "{cut}: {n} of {begun}");
+                assert!(at.is_some_and(|a| a <= cut as u64), "{cut}: {at:?}");
+                seen[0] += 1;
+            }
+            Err(e) => {
+                let text = e.to_string();
+                let early = text.contains("before its first exchange") || text.contains("not a recording");
+                assert!(early && cut < list[1].1 as usize + 1, "{cut}: {text}");
+                seen[1] += 1;
+            }
+        }
+    }
+    assert!(seen[0] > 20 && seen[1] > 5, "{seen:?}");
+}
+
+#[test]
+fn a_flipped_bit_is_an_error_that_names_its_place() {
+    let bytes = recorded("flip", &[("record.first", "2")], 3, [1, 1]);
+    let mut seed = 5;
+    for n in 0..300 {
+        // file and chunk heads are hit often, payloads now and then
+        let at = if n < 200 { n } else { (common::random(&mut seed) * bytes.len() as f64) as usize };
+        let mut bad = bytes.clone();
+        bad[at] ^= 1 << (n % 8);
+        let e = read_all(&bad).err().unwrap_or_else(|| panic!("byte {at}: not noticed"));
+        let text = e.to_string();
+        assert!(
+            ["damaged at byte", "not a recording", "format", "byte order"].iter().any(|w| text.contains(w)),
+            "byte {at}: {text}"
+        );
+    }
+}
+
+#[test]
+fn strangers_are_named() {
+    let bytes = recorded("strange", &[("record.first", "1")], 1, [1, 1]);
+    let error = |b: &[u8]| open(b).err().unwrap().to_string();
+    assert!(error(&[]).contains("not a recording of voidage (it has 0 bytes)"));
+    assert!(error(b"solver logs and other text").contains("it begins with \"solver l\""));
+    let mut other = bytes.clone();
+    other[8..12].reverse();
+    assert!(error(&other).contains("other byte order"));
+    let mut other = bytes.clone();
+    other[12] = 9;
+    assert!(error(&other).contains("recording format 9, this program reads format 1"));
+    // a header with a right checksum that promises more than there is
+    let mut huge = voidage::record::chunk::file_head().to_vec();
+    let head = voidage::record::head::encode(&voidage::record::Head::Index);
+    for raw in [u64::MAX, 1 << 62, 1 << 40] {
+        let mut h = voidage::record::chunk::header(&head, &[], raw, 1);
+        assert!(read_all(&[&huge[..], &h].concat()).is_err());
+        h[8..16].copy_from_slice(&raw.to_le_bytes());
+        assert!(read_all(&[&huge[..], &h].concat()).is_err());
+    }
+    huge.extend([0xff; 4096]);
+    assert!(error(&huge).contains("damaged at byte 16"));
+    assert!(open(&bytes).is_ok());
+}
