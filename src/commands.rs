@@ -2,6 +2,8 @@
 //! The commands of the program: from arguments to an exit code. What is printed for people is printed here.
 #![allow(clippy::print_stderr, clippy::print_stdout)]
 
+pub mod export;
+pub mod inspect;
 pub mod record;
 
 use crate::config::{self, CaseFile, Config, Problem, Severity};

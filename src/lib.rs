@@ -36,6 +36,7 @@ pub mod sums;
 
 pub mod comm;
 pub mod couple;
+pub mod inspect;
 pub mod launch;
 pub mod monitor;
 pub mod output;

@@ -70,6 +70,31 @@ enum Command {
         #[arg(long, default_value_t = 0)]
         threads: usize,
     },
+    /// Tells what a scene is made of, which terms matter in it, and what should be changed
+    Inspect {
+        /// recording, or folder with case.toml
+        file: PathBuf,
+        /// override a setting: section.key=value (repeatable)
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        set: Vec<String>,
+        /// terms above it are to be modelled
+        #[arg(long, default_value_t = 1e-2)]
+        accuracy: f64,
+    },
+    /// Writes a recording as ParaView series or as CSV tables, with its monitor
+    Export {
+        /// recording
+        file: PathBuf,
+        /// folder, new or empty [default: beside the recording, named after it]
+        #[arg(long, value_name = "FOLDER")]
+        into: Option<PathBuf>,
+        /// vtk (.pvd with .vtu and .vtp) or csv
+        #[arg(long, default_value = "vtk")]
+        format: String,
+        /// every n-th recorded exchange
+        #[arg(long, default_value_t = 1)]
+        every: usize,
+    },
     /// Prints the reference of case.toml, or of monitor.csv
     Explain {
         /// case or monitor
@@ -103,6 +128,10 @@ fn main() -> ExitCode {
         Command::Couple { case, resolved, restart } => commands::couple(&case, resolved, restart.as_deref()),
         Command::Replay { file, set, compare, save, threads } => {
             commands::record::replay(&file, &set, compare.as_deref(), save.as_deref(), threads)
+        }
+        Command::Inspect { file, set, accuracy } => commands::inspect::inspect(&file, &set, accuracy),
+        Command::Export { file, into, format, every } => {
+            commands::export::export(&file, into.as_deref(), &format, every)
         }
         Command::Explain { topic } => commands::explain(&topic),
         Command::Bench { json, quick } => commands::bench(json.as_deref(), quick),
