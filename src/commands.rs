@@ -245,6 +245,7 @@ fn exchange(
     let mut run = Exchange {
         partners: Partners::new(Vec::new(), Vec::new(), Duration::ZERO),
         step,
+        pool: setup::pool(config)?,
         two_way: config.file.coupling.feedback == config::Feedback::TwoWay,
         period: config.period(),
         start: config.control.start,

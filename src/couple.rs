@@ -128,6 +128,8 @@ pub struct Exchange<'a, T: Transport> {
     pub partners: Partners<T>,
     /// The stages.
     pub step: CouplingStep,
+    /// Threads the stages run on; `None`: on the calling one.
+    pub pool: Option<rayon::ThreadPool>,
     /// False: the fluid does not feel the particles.
     pub two_way: bool,
     /// Δt, s.
@@ -212,12 +214,22 @@ impl<T: Transport> Exchange<'_, T> {
             self.close(o, Some(&particles), course)?;
         }
         let stage = |source| CoupleError::Step { step: k, source };
-        self.step.before_fluid(&mut particles, first).map_err(stage)?;
+        let step = &mut self.step;
+        match &self.pool {
+            Some(pool) => pool.install(|| step.before_fluid(&mut particles, first)),
+            None => step.before_fluid(&mut particles, first),
+        }
+        .map_err(stage)?;
         self.send_sources(k, time)?;
         if !first {
             (last, write, reaction) = self.receive_fluid(k, &mut course.fluid, &mut wait_cfd)?;
         }
-        self.step.after_fluid(&particles, &course.fluid, first).map_err(stage)?;
+        let (step, fluid) = (&mut self.step, &course.fluid);
+        match &self.pool {
+            Some(pool) => pool.install(|| step.after_fluid(&particles, fluid, first)),
+            None => step.after_fluid(&particles, fluid, first),
+        }
+        .map_err(stage)?;
         self.step.books.reaction = reaction;
         let file = |source| CoupleError::File { what: "restart set", source };
         let set = match &self.sets {

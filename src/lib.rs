@@ -33,6 +33,7 @@ pub mod bench;
 pub mod commands;
 pub mod config;
 pub mod sums;
+pub mod threads;
 
 pub mod comm;
 pub mod couple;

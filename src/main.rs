@@ -66,9 +66,6 @@ enum Command {
         /// record the replay
         #[arg(long, value_name = "FILE")]
         save: Option<PathBuf>,
-        /// threads of the smoother; 0: one per core
-        #[arg(long, default_value_t = 0)]
-        threads: usize,
     },
     /// Tells what a scene is made of, which terms matter in it, and what should be changed
     Inspect {
@@ -126,8 +123,8 @@ fn main() -> ExitCode {
         Command::Run { case, into, set, restart } => commands::run(&case, into.as_deref(), &set, restart),
         Command::Check { case, set } => commands::check(&case, &set),
         Command::Couple { case, resolved, restart } => commands::couple(&case, resolved, restart.as_deref()),
-        Command::Replay { file, set, compare, save, threads } => {
-            commands::record::replay(&file, &set, compare.as_deref(), save.as_deref(), threads)
+        Command::Replay { file, set, compare, save } => {
+            commands::record::replay(&file, &set, compare.as_deref(), save.as_deref())
         }
         Command::Inspect { file, set, accuracy } => commands::inspect::inspect(&file, &set, accuracy),
         Command::Export { file, into, format, every } => {

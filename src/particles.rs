@@ -2,16 +2,18 @@
 //! Stage 1, receive: particles of all DEM ranks in one table.
 //!
 //! Reads PARTICLES frames (SI units); writes one table in which every particle keeps its place of the last
-//! exchange (by cell, `arrange`), new ones behind in the order of their ids. Does not know the mesh.
+//! exchange (by cell, `arrange`), new ones behind in the order of their ids; brings it into a new order. Does not know
+//! the mesh.
 
 use crate::arrange::Places;
 use crate::mesh::NONE;
 use crate::scheme::History;
+use crate::threads;
 use std::f64::consts::PI;
 use thiserror::Error;
 use voidage_wire::{Frame, WireError, field};
 
-/// All particles of one exchange; the order is that of the last exchange, no result depends on it.
+/// All particles of one exchange, in the order of the last one when received, in that of this one once located.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Particles {
     /// global id
@@ -41,6 +43,15 @@ pub struct Totals {
     pub taken: [f64; 3],
     /// impulse charged to the fluid
     pub charged: [f64; 3],
+}
+
+/// Memory `Particles::arrange` copies through.
+#[derive(Clone, Debug, Default)]
+pub struct Spare {
+    ids: Vec<i64>,
+    origins: Vec<(u32, u32)>,
+    numbers: Vec<f64>,
+    vectors: Vec<[f64; 3]>,
 }
 
 /// A particle that cannot be coupled.
@@ -93,13 +104,11 @@ impl Particles {
         let order = in_order(&ids, last)?;
         let vectors = |name: u32| -> Result<Vec<[f64; 3]>, WireError> {
             let parts = frames.iter().zip(&ids).map(|(f, i)| f.vectors_of(name, i.len()));
-            let parts = parts.collect::<Result<Vec<_>, _>>()?;
-            Ok(order.iter().map(|o| parts[o.1 as usize][o.2 as usize]).collect())
+            Ok(gathered(&parts.collect::<Result<Vec<_>, _>>()?, &order))
         };
         let scalars = |name: u32| -> Result<Vec<f64>, WireError> {
             let parts = frames.iter().zip(&ids).map(|(f, i)| f.f64s_of(name, i.len()));
-            let parts = parts.collect::<Result<Vec<_>, _>>()?;
-            Ok(order.iter().map(|o| parts[o.1 as usize][o.2 as usize]).collect())
+            Ok(gathered(&parts.collect::<Result<Vec<_>, _>>()?, &order))
         };
         let mut totals = Totals::default();
         for f in frames {
@@ -132,7 +141,37 @@ impl Particles {
         Ok(p)
     }
 
+    /// Brings the table into the order of `list`, places in it as it is.
+    pub fn arrange(&mut self, list: &[u32], spare: &mut Spare) {
+        let h = &mut self.history;
+        permute(&mut self.id, list, &mut spare.ids);
+        permute(&mut self.origin, list, &mut spare.origins);
+        for array in [&mut self.radius, &mut self.mass, &mut h.drag_coefficient] {
+            permute(array, list, &mut spare.numbers);
+        }
+        for array in [
+            &mut self.position,
+            &mut self.velocity,
+            &mut self.ledger,
+            &mut h.impulse,
+            &mut h.drive,
+            &mut h.force,
+            &mut h.velocity,
+        ] {
+            permute(array, list, &mut spare.vectors);
+        }
+    }
+
     fn check(&self) -> Result<(), ParticleError> {
+        // any NaN or infinity times zero is NaN
+        let zero = |v: &[f64]| v.iter().map(|x| x * 0.0).sum::<f64>() == 0.0;
+        let vectors = [&self.position, &self.velocity, &self.ledger];
+        let positive = |v: &[f64]| v.iter().all(|x| *x > 0.0);
+        let good = vectors.iter().all(|v| zero(v.as_flattened()))
+            && [&self.radius, &self.mass].iter().all(|v| zero(v) && positive(v));
+        if good && self.history.drag_coefficient.is_empty() {
+            return Ok(());
+        }
         let finite = |v: &[f64; 3]| v.iter().all(|x| x.is_finite());
         for i in 0..self.len() {
             let what = match () {
@@ -150,6 +189,28 @@ impl Particles {
         }
         Ok(())
     }
+}
+
+/// One array of all messages, in the order of the table.
+fn gathered<T: Copy>(parts: &[&[T]], order: &[(i64, u32, u32)]) -> Vec<T> {
+    match parts {
+        [one] => order.iter().map(|o| one[o.2 as usize]).collect(),
+        _ => order.iter().map(|o| parts[o.1 as usize][o.2 as usize]).collect(),
+    }
+}
+
+/// `array` in the order of `list`; an empty one stays empty.
+fn permute<T: Copy + Default + Send + Sync>(array: &mut Vec<T>, list: &[u32], spare: &mut Vec<T>) {
+    const PIECE: usize = 8192;
+    if array.is_empty() {
+        return;
+    }
+    spare.resize(list.len(), T::default());
+    let from = &*array;
+    threads::map(list.chunks(PIECE).zip(spare.chunks_mut(PIECE)).collect(), |(list, to)| {
+        to.iter_mut().zip(list).for_each(|(t, i)| *t = from[*i as usize]);
+    });
+    std::mem::swap(array, spare);
 }
 
 /// (id, rank, position in its message) of all particles: known ones in their last order, then new ones by id.

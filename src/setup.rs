@@ -63,6 +63,13 @@ pub fn setup(c: &Config) -> Result<Setup, String> {
     })
 }
 
+/// Threads for the stages; none if one is enough.
+pub fn pool(c: &Config) -> Result<Option<rayon::ThreadPool>, String> {
+    let n = c.file.run.threads as usize;
+    let pool = || rayon::ThreadPoolBuilder::new().num_threads(n).build();
+    (n > 1).then(pool).transpose().map_err(|e| format!("run.threads = {n}: {e}"))
+}
+
 /// The mapping by name, ready for the mesh.
 pub fn mapping(c: &Config, mesh: &Mesh) -> Result<Box<dyn Mapping>, String> {
     let name = &c.file.map.method;

@@ -15,10 +15,11 @@ use crate::linearise::{Predicted, linearise};
 use crate::locate::{Locator, Lost};
 use crate::map::{Mapping, Weights};
 use crate::mesh::{Mesh, NONE};
-use crate::particles::Particles;
+use crate::particles::{Particles, Spare};
 use crate::scheme::{Before, Cells, Scheme};
 use crate::smooth::{Active, Direction, Field, Scratch, Smoother};
-use crate::sums::{Sum, norm};
+use crate::sums::{Sums, norm};
+use crate::threads;
 use std::time::Instant;
 use thiserror::Error;
 
@@ -126,7 +127,7 @@ pub struct Sources {
     pub su: Vec<[f64; 3]>,
 }
 
-/// What drives the particles for the next interval, in the order of `Particles`.
+/// What drives the particles for the next interval, in the order `before_fluid` brought `Particles` into.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drive {
     /// K, kg/s
@@ -189,9 +190,10 @@ pub struct CouplingStep {
     use_positive: bool,
     weights: Weights,
     active: Active,
-    /// host cell of each particle, in the order of the table
+    /// host cell of each particle
     hosts: Vec<u32>,
     order: Order,
+    spare: Spare,
     /// places and hosts of the last exchange, in its order
     places: Places,
     last_hosts: Vec<u32>,
@@ -226,6 +228,8 @@ pub struct CouplingStep {
 
 /// Lanes of the first pass: ε_s, ε_s U_s (1–3) and, from here, the last fluid velocity.
 const FLUID: usize = 4;
+/// Particles whose drag is computed together: their numbers stay in the nearest cache.
+const BATCH: usize = 256;
 
 impl CouplingStep {
     /// Takes the mesh and the methods; `positive` is the smoother used when a result would turn negative.
@@ -249,6 +253,7 @@ impl CouplingStep {
             active: Active::default(),
             hosts: Vec::new(),
             order: Order::default(),
+            spare: Spare::default(),
             places: Places::default(),
             last_hosts: Vec::new(),
             fluid_velocity: vec![[0.0; 3]; n],
@@ -295,7 +300,8 @@ impl CouplingStep {
         &self.places
     }
 
-    /// Stages 2 to 7. `first`: exchange 0, where there is no fluid step to come and nothing is charged.
+    /// Stages 2 to 7; brings the particles into the order of this exchange. `first`: exchange 0, where there is no
+    /// fluid step to come and nothing is charged.
     pub fn before_fluid(&mut self, p: &mut Particles, first: bool) -> Result<(), StepError> {
         self.facts = Facts::default();
         if self.setup.scheme.wants_history() && p.history.drag_coefficient.len() != p.len() {
@@ -325,7 +331,7 @@ impl CouplingStep {
         Ok(())
     }
 
-    /// Stage 2: host cells; last hosts are only a guess where to look first.
+    /// Stage 2: host cells, and the table in their order; last hosts are only a guess where to look first.
     fn locate(&mut self, p: &mut Particles) -> Result<(), StepError> {
         let begin = Instant::now();
         self.hosts.clear();
@@ -342,20 +348,33 @@ impl CouplingStep {
             self.facts.excluded += 1;
         }
         let located = Instant::now();
-        self.order.update(self.mesh.len(), &p.id, &self.hosts);
-        let ids: Vec<i64> = self.order.list.iter().map(|i| p.id[*i as usize]).collect();
-        self.places.update(&ids);
+        let list = self.order.update(self.mesh.len(), &p.id, &self.hosts);
+        p.arrange(list, &mut self.spare);
         self.last_hosts.clear();
-        self.last_hosts.extend(self.order.list.iter().map(|i| self.hosts[*i as usize]));
+        self.last_hosts.extend(list.iter().map(|i| self.hosts[*i as usize]));
+        self.hosts.clone_from(&self.last_hosts);
+        self.places.update(&p.id);
         self.seconds.locate = (located - begin).as_secs_f64();
         self.seconds.arrange = located.elapsed().as_secs_f64();
         Ok(())
     }
 
-    /// `work` all zero, its active rows about to be written.
-    fn clean_work(&mut self) {
-        self.dirty.iter().for_each(|j| self.work[*j as usize] = [0.0; 8]);
-        self.dirty.clone_from(&self.active.rows);
+    /// `work` all zero; in the active rows, which are about to be written, with the last fluid velocity if asked for.
+    fn clear_work(&mut self, fluid: bool) {
+        let rows = &self.active.rows;
+        if self.dirty != *rows {
+            self.dirty.iter().for_each(|j| self.work[*j as usize] = [0.0; 8]);
+            self.dirty.clone_from(rows);
+        }
+        let pieces = threads::rows(rows, self.mesh.len());
+        let parts = threads::cut(&mut self.work, pieces.iter().map(|p| p.1.end));
+        let velocity = &self.fluid_velocity;
+        threads::map(pieces.into_iter().zip(parts).collect(), |((rows, slots), work)| {
+            for j in rows.iter().map(|j| *j as usize) {
+                let u = if fluid { velocity[j] } else { [0.0; 3] };
+                work[j - slots.start] = [0.0, 0.0, 0.0, 0.0, u[0], u[1], u[2], 0.0];
+            }
+        });
     }
 
     fn smooth_work(&mut self, direction: Direction) {
@@ -366,59 +385,63 @@ impl CouplingStep {
     /// Stage 4 (pass a): ε_s, ε_s U_s and, beside them, G of the last fluid velocity. False if an ε_s is negative.
     fn solids(&mut self, p: &Particles) -> bool {
         let begin = Instant::now();
-        self.clean_work();
         let wanted = self.setup.scheme.wants_solids();
         let with_flux = self.setup.solids_flux || wanted;
-        let (mut volume, mut scale, mut momentum) = (Sum::default(), Sum::default(), [Sum::default(); 3]);
         let around = self.setup.drag.looks_around();
-        self.weights.deposit(&self.mesh, &self.order.list, &mut self.work, |i| {
+        self.clear_work(true);
+        // V, V U_s, V |U_s|
+        let sums = self.weights.deposit(&self.mesh, &self.order, &mut self.work, |i, sums: &mut Sums<5>| {
             let (v, u) = (p.volume(i), if with_flux { p.velocity[i] } else { [0.0; 3] });
-            volume.add(v);
-            scale.add(v * norm(u));
-            (0..3).for_each(|a| momentum[a].add(v * u[a]));
             let surface = if around { 0.5 * v / p.radius[i] } else { 0.0 };
-            [v, v * u[0], v * u[1], v * u[2], 0.0, 0.0, 0.0, surface]
+            let flux = u.map(|u| v * u);
+            sums.add([v, flux[0], flux[1], flux[2], v * norm(u)]);
+            [v, flux[0], flux[1], flux[2], 0.0, 0.0, 0.0, surface]
         });
+        let [volume, momentum @ .., scale] = Sums::total(sums);
         if wanted {
             self.mapped = self.work.to_vec();
-        }
-        for j in self.active.rows.iter().map(|j| *j as usize) {
-            self.work[j][FLUID..FLUID + 3].copy_from_slice(&self.fluid_velocity[j]);
         }
         self.smooth_work(Direction::Both);
         if wanted {
             self.smoothed = self.work.to_vec();
         }
-        let q = &mut self.sources;
-        for j in self.filled.drain(..).map(|j| j as usize) {
-            (q.voidage[j], q.solids_flux[j], q.sp[j], q.su[j]) = (1.0, [0.0; 3], 0.0, [0.0; 3]);
-        }
-        self.filled.clone_from(&self.active.rows);
-        let (mut found, mut flux) = (Sum::default(), [Sum::default(); 3]);
-        let (mut negative, floor) = (false, self.setup.voidage_min);
-        self.facts.solid_fraction_max = 0.0;
-        self.facts.capped_volume = 0.0;
-        for j in self.active.rows.iter().map(|j| *j as usize) {
-            let (l, v) = (&self.work[j], self.mesh.volume[j]);
-            negative |= l[0] < 0.0;
-            found.add(l[0] * v);
-            (0..3).for_each(|a| flux[a].add(l[1 + a] * v));
-            let fact = &mut self.facts;
-            fact.solid_fraction_max = fact.solid_fraction_max.max(l[0]);
-            let mut e = 1.0 - l[0];
-            if e < floor && floor > 0.0 {
-                fact.capped_volume += (floor - e) * v;
-                e = floor;
+        let (q, rows) = (&mut self.sources, &self.active.rows);
+        if self.filled != *rows {
+            for j in self.filled.iter().map(|j| *j as usize) {
+                (q.voidage[j], q.solids_flux[j], q.sp[j], q.su[j]) = (1.0, [0.0; 3], 0.0, [0.0; 3]);
             }
-            q.voidage[j] = e;
-            q.solids_flux[j] = [l[1], l[2], l[3]];
+            self.filled.clone_from(rows);
         }
-        let (total, scale) = (volume.value(), scale.value());
-        self.facts.solid_volume_error = ratio((found.value() - total).abs(), total);
-        let gap = [0, 1, 2].map(|a| flux[a].value() - momentum[a].value());
+        let pieces = threads::rows(rows, self.mesh.len());
+        let ends = || pieces.iter().map(|p| p.1.end);
+        let parts =
+            threads::cut(&mut q.voidage, ends()).into_iter().zip(threads::cut(&mut q.solids_flux, ends()));
+        let (work, volumes, floor) = (&self.work, &self.mesh.volume, self.setup.voidage_min);
+        // Σ V of ε_s, of ε_s U_s and of what is capped; largest ε_s; is one negative
+        let found = threads::map(pieces.iter().zip(parts).collect(), |((rows, slots), (voidage, flux))| {
+            let (mut sums, mut most, mut negative) = (Sums::<5>::default(), 0.0f64, false);
+            for j in rows.iter().map(|j| *j as usize) {
+                let (l, v) = (&work[j], volumes[j]);
+                let (mut e, mut capped) = (1.0 - l[0], 0.0);
+                if e < floor && floor > 0.0 {
+                    (capped, e) = ((floor - e) * v, floor);
+                }
+                negative |= l[0] < 0.0;
+                most = most.max(l[0]);
+                sums.add([l[0] * v, l[1] * v, l[2] * v, l[3] * v, capped]);
+                voidage[j - slots.start] = e;
+                flux[j - slots.start] = [l[1], l[2], l[3]];
+            }
+            (sums, most, negative)
+        });
+        let [sum, flux @ .., capped] = Sums::total(found.iter().map(|f| f.0));
+        self.facts.solid_fraction_max = found.iter().fold(0.0, |m, f| m.max(f.1));
+        self.facts.capped_volume = capped;
+        self.facts.solid_volume_error = ratio((sum - volume).abs(), volume);
+        let gap = [0, 1, 2].map(|a| flux[a] - momentum[a]);
         self.facts.solid_momentum_error = ratio(norm(gap), scale);
         self.seconds.solids = begin.elapsed().as_secs_f64();
-        !negative
+        !found.iter().any(|f| f.2)
     }
 
     /// The run stops where no fluid is left, unless capping was chosen.
@@ -442,20 +465,28 @@ impl CouplingStep {
         self.predict(p, false);
         let predicted = Instant::now();
         self.seconds.forces = (predicted - begin).as_secs_f64();
-        self.clean_work();
+        self.clear_work(false);
         let (q, period, scheme) = (&self.predicted, self.setup.period, self.setup.scheme);
         let ledger = |i: usize| if scheme.conservative() { p.ledger[i] } else { [0.0; 3] };
-        self.weights.deposit(&self.mesh, &self.order.list, &mut self.work, |i| {
+        self.weights.deposit(&self.mesh, &self.order, &mut self.work, |i, _: &mut ()| {
             linearise(&q[i], p.velocity[i], ledger(i), period)
         });
         self.smooth_work(Direction::Spread);
-        let mut positive = true;
-        for j in self.active.rows.iter().map(|j| *j as usize) {
-            let l = &self.work[j];
-            positive &= l[0] >= 0.0 && l[4] >= 0.0;
-            self.sources.sp[j] = l[0];
-            self.sources.su[j] = [l[1], l[2], l[3]];
-        }
+        let pieces = threads::rows(&self.active.rows, self.mesh.len());
+        let ends = || pieces.iter().map(|p| p.1.end);
+        let (work, s) = (&self.work, &mut self.sources);
+        let parts = threads::cut(&mut s.sp, ends()).into_iter().zip(threads::cut(&mut s.su, ends()));
+        let positive = threads::map(pieces.iter().zip(parts).collect(), |((rows, slots), (sp, su))| {
+            let mut positive = true;
+            for j in rows.iter().map(|j| *j as usize) {
+                let l = &work[j];
+                positive &= l[0] >= 0.0 && l[4] >= 0.0;
+                sp[j - slots.start] = l[0];
+                su[j - slots.start] = [l[1], l[2], l[3]];
+            }
+            positive
+        });
+        let positive = positive.iter().all(|p| *p);
         if !scheme.conservative() {
             let cells = Cells {
                 smoothed: &self.work,
@@ -472,12 +503,33 @@ impl CouplingStep {
     /// Stages 5 and 6: K from the voidage at the particle and the fluid of the last step; C, B, d. In exchange 0
     /// the fluid stands in `gathered`, else it was smoothed in pass a.
     fn predict(&mut self, p: &Particles, first: bool) {
+        self.predicted.resize(p.len(), Predicted::default());
+        self.predicted[self.order.inside..].fill(Predicted::default());
+        let pieces = &self.order.pieces;
+        let mut out = std::mem::take(&mut self.predicted);
+        let parts = threads::cut(&mut out, pieces.iter().map(|p| p.particles.end));
+        threads::map(pieces.iter().zip(parts).collect(), |(piece, out)| {
+            let begin = piece.particles.start;
+            for (k, out) in out.chunks_mut(BATCH).enumerate() {
+                self.predict_batch(p, begin + k * BATCH, first, out);
+            }
+        });
+        self.predicted = out;
+        if self.setup.extra.forces() {
+            self.extra_forces(p);
+        }
+    }
+
+    /// `predict` for the particles from `begin` on.
+    fn predict_batch(&self, p: &Particles, begin: usize, first: bool, out: &mut [Predicted]) {
         let s = &self.setup;
         let (around, ratio) = (s.drag.looks_around(), s.extra.ratio);
         let parcel = ratio * ratio * ratio;
-        self.predicted.clear();
-        self.predicted.resize(p.len(), Predicted::default());
-        for i in self.order.list.iter().map(|i| *i as usize) {
+        let (mut slips, mut drag) = ([Slip::default(); BATCH], [0.0; BATCH]);
+        let (slips, drag) = (&mut slips[..out.len()], &mut drag[..out.len()]);
+        let mut slip = [[0.0; 3]; BATCH];
+        for k in 0..out.len() {
+            let i = begin + k;
             let l = self.weights.gather(&self.work, i);
             let voidage = (1.0 - l[0]).max(s.voidage_min.max(f64::MIN_POSITIVE));
             let g = if first { self.weights.gather(&self.gathered, i) } else { l };
@@ -492,32 +544,32 @@ impl CouplingStep {
                 p.position[i],
                 gathered,
             );
-            let slip = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
-            let at = Slip {
+            slip[k] = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
+            out[k].defect = [0, 1, 2].map(|a| u[a] - gathered[a]);
+            slips[k] = Slip {
                 diameter: 2.0 * p.radius[i] / ratio,
                 voidage,
-                speed: norm(slip),
+                speed: norm(slip[k]),
                 kinematic_viscosity: s.kinematic_viscosity,
                 density: s.density,
             };
-            let mut k = parcel
-                * if around {
-                    let (sauter_diameter, cell_volume) = (l[0] / (l[7] * ratio), self.mesh.volume[host]);
-                    s.drag.drag_coefficient_in(&at, &Around { sauter_diameter, cell_volume })
-                } else {
-                    s.drag.drag_coefficient(&at)
-                };
-            if s.model_b {
-                k /= voidage;
+            if around {
+                let (sauter_diameter, cell_volume) = (l[0] / (l[7] * ratio), self.mesh.volume[host]);
+                let around = Around { sauter_diameter, cell_volume };
+                drag[k] = s.drag.drag_coefficient_in(&slips[k], &around);
             }
-            let defect = [0, 1, 2].map(|a| u[a] - gathered[a]);
+        }
+        if !around {
+            s.drag.coefficients(slips, drag);
+        }
+        for k in 0..out.len() {
+            let i = begin + k;
+            let share = if s.model_b { parcel / slips[k].voidage } else { parcel };
             let (v, inertia) = (p.velocity[i], p.mass[i]);
             let last = p.history.last(i, v, inertia, s.gravity, s.period);
-            let before = Before { drag_coefficient: k, slip, inertia, period: s.period, last };
-            self.predicted[i] = Predicted::new(s.scheme, &before, defect);
-        }
-        if s.extra.forces() {
-            self.extra_forces(p);
+            let drag_coefficient = drag[k] * share;
+            let before = Before { drag_coefficient, slip: slip[k], inertia, period: s.period, last };
+            out[k] = Predicted::new(s.scheme, &before, out[k].defect);
         }
     }
 
@@ -536,8 +588,9 @@ impl CouplingStep {
             kinematic_viscosity: s.kinematic_viscosity,
         };
         let slip = |i: usize| [0, 1, 2].map(|a| u[self.hosts[i] as usize][a] - p.velocity[i][a]);
-        s.extra.compute(&flow, &self.order.list, &self.hosts, &p.radius, slip, &mut self.extra);
-        for i in self.order.list.iter().map(|i| *i as usize) {
+        let inside = self.order.inside;
+        s.extra.compute(&flow, &self.hosts[..inside], &p.radius, slip, &mut self.extra);
+        for i in 0..inside {
             (0..3).for_each(|a| self.predicted[i].explicit[a] += self.extra[i][a]);
         }
     }
@@ -555,15 +608,14 @@ impl CouplingStep {
             // no fluid step lies behind: K is computed with the fluid as it stands, nothing is charged
             self.predict(p, true);
         }
-        let s = &self.setup;
-        let n = p.len();
-        let d = &mut self.drive;
-        d.drag_coefficient.clear();
-        d.drag_coefficient.resize(n, 0.0);
-        for list in [&mut d.velocity, &mut d.force, &mut d.charged] {
-            list.clear();
-            list.resize(n, [0.0; 3]);
-        }
+        self.drive_particles(p, first);
+        self.seconds.drive = gathered.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// The replies, and the sums over them: old ledger, charged, external impulses, |charged + ledger|.
+    fn drive_particles(&mut self, p: &Particles, first: bool) {
+        let (s, n, inside) = (&self.setup, p.len(), self.order.inside);
         let solid = |j: usize| 1.0 - self.sources.voidage[j];
         let stress = s
             .extra
@@ -571,51 +623,63 @@ impl CouplingStep {
             .map(|t| (0..self.mesh.len()).map(|j| [t.stress(solid(j)), 0.0, 0.0]).collect::<Vec<_>>());
         let conservative = s.scheme.conservative();
         let ledger = |i: usize| if conservative { p.ledger[i] } else { [0.0; 3] };
-        let (mut scale, mut sums) = (Sum::default(), [[Sum::default(); 3]; 3]);
-        for i in self.order.list.iter().map(|i| *i as usize) {
-            let (g, q, v) = (self.weights.gather(&self.gathered, i), &self.predicted[i], p.volume(i));
-            let u = [0, 1, 2].map(|a| g[a] + q.defect[a]);
-            let mut outer =
-                [0, 1, 2].map(|a| -v * (s.density * s.archimedes[a] + s.mean_pressure_gradient[a]));
-            if let Some(tau) = &stress {
-                let host = self.hosts[i] as usize;
-                let f = Extra::stress_force(&self.mesh, tau, host, v, solid(host));
-                (0..3).for_each(|a| outer[a] += f[a]);
-            }
-            let inner = if s.pressure_force { [3, 4, 5].map(|a| -v * g[a]) } else { [0.0; 3] };
-            let force = [0, 1, 2].map(|a| inner[a] + outer[a]);
-            let slip = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
-            let charged = if first {
-                [0.0; 3]
-            } else {
-                [0, 1, 2].map(|a| s.period * (q.implicit * slip[a] + q.explicit[a] + force[a]))
-            };
-            let external = if first { [0.0; 3] } else { outer.map(|x| s.period * x) };
-            let old = ledger(i);
-            scale.add(norm([0, 1, 2].map(|a| charged[a] + old[a])));
-            for a in 0..3 {
-                sums[0][a].add(charged[a]);
-                sums[1][a].add(old[a]);
-                sums[2][a].add(external[a]);
-            }
-            d.drag_coefficient[i] = q.drag_coefficient;
-            d.velocity[i] = u;
-            let extra = self.extra.get(i).copied().unwrap_or_default();
-            d.force[i] = [0, 1, 2].map(|a| force[a] + extra[a]);
-            d.charged[i] = charged;
+        let d = &mut self.drive;
+        d.drag_coefficient.resize(n, 0.0);
+        for list in [&mut d.velocity, &mut d.force, &mut d.charged] {
+            list.resize(n, [0.0; 3]);
         }
-        for i in (0..n).filter(|i| self.hosts[*i] == NONE) {
+        let pieces = &self.order.pieces;
+        let ends = || pieces.iter().map(|p| p.particles.end);
+        let coefficient = threads::cut(&mut d.drag_coefficient, ends());
+        let [velocity, force, charged] =
+            [&mut d.velocity, &mut d.force, &mut d.charged].map(|v| threads::cut(v, ends()));
+        let parts = coefficient.into_iter().zip(velocity).zip(force).zip(charged);
+        let sums =
+            threads::map(pieces.iter().zip(parts).collect(), |(piece, (((k_of, u_of), f_of), j_of))| {
+                let mut sums = Sums::<10>::default();
+                for (at, i) in piece.particles.clone().enumerate() {
+                    let (g, q, v) = (self.weights.gather(&self.gathered, i), &self.predicted[i], p.volume(i));
+                    let u = [0, 1, 2].map(|a| g[a] + q.defect[a]);
+                    let mut outer =
+                        [0, 1, 2].map(|a| -v * (s.density * s.archimedes[a] + s.mean_pressure_gradient[a]));
+                    if let Some(tau) = &stress {
+                        let host = self.hosts[i] as usize;
+                        let f = Extra::stress_force(&self.mesh, tau, host, v, solid(host));
+                        (0..3).for_each(|a| outer[a] += f[a]);
+                    }
+                    let inner = if s.pressure_force { [3, 4, 5].map(|a| -v * g[a]) } else { [0.0; 3] };
+                    let force = [0, 1, 2].map(|a| inner[a] + outer[a]);
+                    let slip = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
+                    let mut charged = [0.0; 3];
+                    let mut external = [0.0; 3];
+                    if !first {
+                        charged =
+                            [0, 1, 2].map(|a| s.period * (q.implicit * slip[a] + q.explicit[a] + force[a]));
+                        external = outer.map(|x| s.period * x);
+                    }
+                    let (j, l, e) = (charged, ledger(i), external);
+                    let size = norm([0, 1, 2].map(|a| j[a] + l[a]));
+                    sums.add([j[0], j[1], j[2], l[0], l[1], l[2], e[0], e[1], e[2], size]);
+                    let extra = self.extra.get(i).copied().unwrap_or_default();
+                    k_of[at] = q.drag_coefficient;
+                    u_of[at] = u;
+                    f_of[at] = [0, 1, 2].map(|a| force[a] + extra[a]);
+                    j_of[at] = charged;
+                }
+                sums
+            });
+        let mut outside = Sums::<10>::default();
+        for i in inside..n {
             // its ledger waits until it is back: L = taken − charged
-            d.charged[i] = ledger(i).map(|l| -l);
-            for a in 0..3 {
-                sums[0][a].add(d.charged[i][a]);
-                sums[1][a].add(ledger(i)[a]);
-            }
+            let l = ledger(i);
+            (d.drag_coefficient[i], d.velocity[i], d.force[i]) = (0.0, [0.0; 3], [0.0; 3]);
+            d.charged[i] = l.map(|l| -l);
+            outside.add([-l[0], -l[1], -l[2], l[0], l[1], l[2], 0.0, 0.0, 0.0, 0.0]);
         }
-        let [charged, old_ledger, external] = sums.map(|s| s.map(Sum::value));
-        self.books = Books { charged, old_ledger, external, scale: scale.value(), reaction: [0.0; 3] };
-        self.seconds.drive = gathered.elapsed().as_secs_f64();
-        Ok(())
+        let t = Sums::total(sums.into_iter().chain([outside]));
+        let at = |k: usize| [t[k], t[k + 1], t[k + 2]];
+        self.books =
+            Books { charged: at(0), old_ledger: at(3), external: at(6), scale: t[9], reaction: [0.0; 3] };
     }
 
     /// Forms ε_s U_s for output where no stage needs it.
@@ -624,7 +688,7 @@ impl CouplingStep {
             return;
         }
         let mut lanes = vec![[0.0; 8]; self.mesh.len()];
-        self.weights.deposit(&self.mesh, &self.order.list, &mut lanes, |i| {
+        self.weights.deposit(&self.mesh, &self.order, &mut lanes, |i, _: &mut ()| {
             let (v, u) = (p.volume(i), p.velocity[i]);
             [v * u[0], v * u[1], v * u[2], 0.0, 0.0, 0.0, 0.0, 0.0]
         });
@@ -644,23 +708,32 @@ impl CouplingStep {
     }
 
     fn take_fluid(&mut self, fluid: &Fluid) -> Result<(), StepError> {
-        let grad = |field: &[[f64; 3]], j: usize| field.get(j).copied().unwrap_or_default();
-        let mut whole = true;
-        for (j, u) in fluid.velocity.iter().enumerate() {
-            let (p, t) = (grad(&fluid.pressure_gradient, j), grad(&fluid.stress_divergence, j));
-            // any NaN or infinity makes this NaN
-            let test = u.iter().chain(&p).chain(&t).map(|x| x * 0.0).sum::<f64>();
-            whole &= test == 0.0;
-        }
-        if !whole {
+        // any NaN or infinity times zero is NaN
+        let zero = |field: &Vec<[f64; 3]>| {
+            let chunks = field.as_flattened().chunks(3 * 8192).collect();
+            let sums = threads::map(chunks, |c: &[f64]| {
+                let (lanes, rest) = c.as_chunks::<8>();
+                let mut sum = [0.0; 8];
+                lanes.iter().for_each(|l| (0..8).for_each(|a| sum[a] += l[a] * 0.0));
+                sum.iter().sum::<f64>() + rest.iter().map(|x| x * 0.0).sum::<f64>()
+            });
+            sums.iter().sum::<f64>() == 0.0
+        };
+        if ![&fluid.velocity, &fluid.pressure_gradient, &fluid.stress_divergence].into_iter().all(zero) {
             return Err(self.not_finite(fluid));
         }
         self.fluid_velocity.clone_from(&fluid.velocity);
-        for j in self.active.rows.iter().map(|j| *j as usize) {
-            let u = fluid.velocity[j];
-            let (p, t) = (grad(&fluid.pressure_gradient, j), grad(&fluid.stress_divergence, j));
-            self.gathered[j] = [u[0], u[1], u[2], p[0] - t[0], p[1] - t[1], p[2] - t[2], 0.0, 0.0];
-        }
+        let grad = |field: &[[f64; 3]], j: usize| field.get(j).copied().unwrap_or_default();
+        let pieces = threads::rows(&self.active.rows, self.mesh.len());
+        let parts = threads::cut(&mut self.gathered, pieces.iter().map(|p| p.1.end));
+        threads::map(pieces.into_iter().zip(parts).collect(), |((rows, slots), gathered)| {
+            for j in rows.iter().map(|j| *j as usize) {
+                let u = fluid.velocity[j];
+                let (p, t) = (grad(&fluid.pressure_gradient, j), grad(&fluid.stress_divergence, j));
+                gathered[j - slots.start] =
+                    [u[0], u[1], u[2], p[0] - t[0], p[1] - t[1], p[2] - t[2], 0.0, 0.0];
+            }
+        });
         let smoother = if self.use_positive { &mut self.positive } else { &mut self.smoother };
         smoother.apply(&mut self.gathered, &self.active, Direction::Gather, &mut self.scratch);
         Ok(())

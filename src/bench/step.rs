@@ -8,7 +8,6 @@ use super::scene;
 use crate::forces::Extra;
 use crate::interpolate::FluidVelocity;
 use crate::map;
-use crate::particles::Particles;
 use crate::smooth;
 use crate::step::{CouplingStep, Seconds, Setup};
 use crate::{forces, scheme};
@@ -121,8 +120,6 @@ pub fn run(case: &Case) -> Result<Cost, String> {
         step.after_fluid(&p, &fluid, k == 0).map_err(|e| e.to_string())?;
         let us = begin.elapsed().as_secs_f64() * 1e6 / p.len() as f64;
         cost.solid_volume_error = cost.solid_volume_error.max(step.facts.solid_volume_error);
-        // as `receive` does: everyone in its last place
-        p = placed(&p, &step);
         for x in &mut p.position {
             (0..3).for_each(|a| x[a] += 2e-5 * (scene::random(&mut seed) - 0.5));
             (0..3).for_each(|a| x[a] = x[a].clamp(0.0, scene::BOX[a]));
@@ -146,23 +143,5 @@ impl Cost {
         (self.locate_ms, self.arrange_ms, self.map_ms) = (ms(s.locate), ms(s.arrange), ms(s.map));
         (self.solids_ms, self.forces_ms, self.sources_ms) = (ms(s.solids), ms(s.forces), ms(s.sources));
         (self.gather_ms, self.drive_ms) = (ms(s.gather), ms(s.drive));
-    }
-}
-
-/// The table in the places of the last step.
-fn placed(p: &Particles, step: &CouplingStep) -> Particles {
-    let mut order: Vec<usize> = (0..p.len()).collect();
-    order.sort_by_key(|i| step.places().of(p.id[*i]));
-    let pick = |v: &[[f64; 3]]| order.iter().map(|i| v[*i]).collect();
-    Particles {
-        id: order.iter().map(|i| p.id[*i]).collect(),
-        origin: order.iter().map(|i| p.origin[*i]).collect(),
-        position: pick(&p.position),
-        velocity: pick(&p.velocity),
-        ledger: pick(&p.ledger),
-        radius: order.iter().map(|i| p.radius[*i]).collect(),
-        mass: order.iter().map(|i| p.mass[*i]).collect(),
-        totals: p.totals,
-        history: p.history.clone(),
     }
 }

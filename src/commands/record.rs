@@ -110,7 +110,6 @@ pub fn replay(
     set: &[String],
     compare: Option<&Path>,
     save: Option<&Path>,
-    threads: usize,
 ) -> u8 {
     let set = match overrides(set) {
         Ok(s) => s,
@@ -119,16 +118,8 @@ pub fn replay(
             return BAD_INPUT;
         }
     };
-    let pool = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
-        Ok(p) => p,
-        Err(e) => {
-            eprintln!("error: --threads {threads}: {e}");
-            return BAD_INPUT;
-        }
-    };
     let begin = Instant::now();
-    let result = pool.install(|| replayed(file, &set, compare, save));
-    match result {
+    match replayed(file, &set, compare, save) {
         Ok(o) => report(&o, file, compare, &set, begin.elapsed().as_secs_f64()),
         Err((e, of)) => {
             if let ReplayError::Record(e) = e {

@@ -40,10 +40,11 @@ pub struct CaseFile {
 pub struct Run {
     pub dem_ranks: u32,
     pub cfd_ranks: u32,
+    pub threads: u32,
 }
 impl Default for Run {
     fn default() -> Self {
-        Self { dem_ranks: 1, cfd_ranks: 1 }
+        Self { dem_ranks: 1, cfd_ranks: 1, threads: 1 }
     }
 }
 
@@ -347,6 +348,7 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("format", "", "-", "version of this file, 1"),
     ("run.dem_ranks", "", "1", "MPI ranks of the particle program"),
     ("run.cfd_ranks", "", "1", "MPI ranks of the fluid solver; the case is decomposed when needed"),
+    ("run.threads", "", "1", "threads of the coupler; the results do not depend on them. The partners wait meanwhile, so their cores are free"),
     ("fluid.case", "", "fluid", "OpenFOAM case, below the case folder"),
     ("fluid.solver", "", "voidageFoam", "voidageFoam, or a stock solver with fvOptions (dilute, model B)"),
     ("fluid.density", "kg/m3", "-", "density of the fluid"),

@@ -51,20 +51,18 @@ impl Extra {
         self.lift.is_some() || self.added_mass > 0.0
     }
 
-    /// Force (N) of each particle of `list` into `out`: lift, and C_a ρ V DU/Dt of the added mass. `radius` (m) and
+    /// Force (N) of each particle with a host into `out`: lift, and C_a ρ V DU/Dt of the added mass. `radius` (m) and
     /// `slip` (u − v, m/s) by particle; particles of one cell should follow each other.
     pub fn compute(
         &self,
         flow: &Flow,
-        list: &[u32],
         hosts: &[u32],
         radius: &[f64],
         slip: impl Fn(usize) -> [f64; 3],
         out: &mut [[f64; 3]],
     ) {
         let (mut last, mut g) = (NONE, [[0.0; 3]; 3]);
-        for i in list.iter().map(|i| *i as usize) {
-            let host = hosts[i];
+        for (i, &host) in hosts.iter().enumerate() {
             if host != last {
                 (last, g) = (host, gradient(flow.mesh, flow.velocity, host as usize));
             }

@@ -5,7 +5,7 @@
 //! cells and one of particles per exchange, numbered like the series. Holds one exchange at a time.
 
 use super::Fields;
-use super::vtk::{self, Data, Series};
+use super::vtk::{self, Data, Grid, Series};
 use crate::monitor::Monitor;
 use crate::record::RecordError;
 use crate::record::moment::Moments;
@@ -33,7 +33,7 @@ pub fn export<R: Read + Seek>(
     let fail = |source| RecordError::File { what: name.clone(), source };
     std::fs::create_dir_all(folder).map_err(fail)?;
     let mut series = [Series::new(folder, "cells", None), Series::new(folder, "particles", None)];
-    let mut times = Vec::new();
+    let (mut times, grid) = (Vec::new(), Grid::new(&m.mesh));
     let (mut seen, mut written) = (0, 0);
     while let Some(x) = m.next()? {
         seen += 1;
@@ -47,7 +47,7 @@ pub fn export<R: Read + Seek>(
         let id = all.ids();
         match format {
             Format::Vtk => {
-                series[0].write(x.time, "vtu", |f| vtk::cells(f, &m.mesh, &all.cells())).map_err(fail)?;
+                series[0].write(x.time, "vtu", |f| grid.write(f, &all.cells())).map_err(fail)?;
                 series[1]
                     .write(x.time, "vtp", |f| vtk::points(f, &p.position, &all.points(&id)))
                     .map_err(fail)?;

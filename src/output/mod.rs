@@ -63,6 +63,7 @@ impl Fields<'_> {
 pub struct Output {
     folder: PathBuf,
     cells: Option<vtk::Series>,
+    grid: Option<vtk::Grid>,
     particles: Option<vtk::Series>,
     camera: Option<Camera>,
     suffix: String,
@@ -82,6 +83,7 @@ impl Output {
         let axis = ["x", "y", "z"].iter().position(|a| *a == o.picture);
         Ok(Self {
             cells: series(o.fields, "cells"),
+            grid: None,
             particles: series(o.particles, "particles"),
             camera: axis.map(Camera::new),
             folder,
@@ -95,7 +97,8 @@ impl Output {
         let (mesh, sources, drive) = (&s.step.mesh, &s.step.sources, &s.step.drive);
         let all = Fields { mesh, sources, drive, fluid: s.fluid, particles: p };
         if let Some(series) = &mut self.cells {
-            series.write(s.time, "vtu", |file| vtk::cells(file, mesh, &all.cells()))?;
+            let grid = self.grid.get_or_insert_with(|| vtk::Grid::new(mesh));
+            series.write(s.time, "vtu", |file| grid.write(file, &all.cells()))?;
         }
         if let Some(series) = &mut self.particles {
             let id = all.ids();

@@ -323,6 +323,7 @@ pub fn replay<R: Read + Seek + 'static>(
     let mut run = Exchange {
         partners,
         step,
+        pool: setup::pool(&config).map_err(ReplayError::Run)?,
         two_way: config.file.coupling.feedback == config::Feedback::TwoWay,
         period: config.period(),
         start: session.origin,

@@ -74,7 +74,7 @@ pub struct Properties {
 }
 
 /// A way to smooth cell fields.
-pub trait Smoother: Send {
+pub trait Smoother: Send + Sync {
     /// Name in case.toml.
     fn name(&self) -> &'static str;
     /// What it keeps, its error, its cost.

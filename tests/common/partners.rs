@@ -223,6 +223,7 @@ pub fn record(file: &Path, c: &Config, steps: i64, ranks: [usize; 2], how: Compr
     let mut run = Exchange {
         partners,
         step,
+        pool: None,
         two_way: true,
         period: PERIOD,
         start: 0.0,
