@@ -3,13 +3,17 @@
 
 mod common;
 
-use common::partners::{case, record};
+use common::partners::{case, record, record_in};
 use std::io::Cursor;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use voidage::config::Compression;
+use voidage::inspect::decide;
+use voidage::inspect::recorded::scene as recorded_scene;
+use voidage::output::export::{Format, export};
+use voidage::record::exercise::exercise;
 use voidage::record::moment::Moments;
 use voidage::record::replay::{Options, Outcome, ReplayError, replay};
-use voidage::record::{End, Reader, RecordError};
+use voidage::record::{End, Reader, RecordError, forecast};
 
 /// A file in a scratch folder, removed at the end.
 struct Scratch(PathBuf);
@@ -130,15 +134,7 @@ fn what_a_replay_cannot_change_is_refused() {
 
 /// Reads all of a file in every way there is; what it comes to. Must not panic.
 fn read_all(bytes: &[u8]) -> Result<(u64, Option<u64>), ReplayError> {
-    let mut m = Moments::new(open(bytes)?)?;
-    for n in 0..m.exchanges.len() {
-        if let Some(x) = m.at(n)? {
-            x.particles()?;
-            x.fluid(&m.mesh)?;
-            x.sources(&m.mesh)?;
-        }
-    }
-    let o = again(bytes, &[])?;
+    let o = exercise(bytes)?;
     assert!(o.comparison.identical(), "damage went unnoticed: {}", o.comparison);
     Ok((o.exchanges, o.cut))
 }
@@ -216,4 +212,131 @@ fn strangers_are_named() {
     huge.extend([0xff; 4096]);
     assert!(error(&huge).contains("damaged at byte 16"));
     assert!(open(&bytes).is_ok());
+}
+
+fn corpus() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/recordings")
+}
+
+#[test]
+fn recordings_of_format_1_are_read_by_every_later_version() {
+    for (name, exchanges) in [("whole.voidage", 4), ("every-third.voidage", 4)] {
+        let bytes = std::fs::read(corpus().join(name)).unwrap();
+        let o = again(&bytes, &[]).unwrap();
+        assert_eq!((o.exchanges, o.cut), (exchanges, None), "{name}");
+        assert_eq!(o.comparison.arrays.len(), 8, "{name}");
+        // a later version may round otherwise, not more
+        for d in o.comparison.arrays.values() {
+            assert!(d.relative() < 1e-10, "{name}: {}", o.comparison);
+        }
+    }
+}
+
+#[test]
+fn files_that_once_made_trouble_end_in_a_result() {
+    let mut n = 0;
+    for e in std::fs::read_dir(corpus()).unwrap().flatten() {
+        let bytes = std::fs::read(e.path()).unwrap();
+        let good = ["whole.voidage", "every-third.voidage"].iter().any(|f| e.path().ends_with(f));
+        assert_eq!(exercise(&bytes).is_ok(), good, "{}", e.path().display());
+        n += 1;
+    }
+    assert!(n > 10, "the corpus is gone");
+}
+
+/// Not a test: makes the whole recordings of the corpus. Those in the repository stay as they are, they are the proof
+/// that later versions read them. `cargo test --test recording makes_the_corpus -- --ignored`
+#[test]
+#[ignore = "makes files"]
+fn makes_the_corpus() {
+    std::fs::create_dir_all(corpus()).unwrap();
+    let every_third: &[_] = &[("record.every", "3"), ("record.last", "2"), ("forces.added_mass", "0.5")];
+    for (name, set, steps, ranks, how) in [
+        ("whole.voidage", ALL, 3, [2, 2], Compression::Lz4),
+        ("every-third.voidage", every_third, 7, [1, 1], Compression::None),
+    ] {
+        let file = corpus().join(name);
+        if !file.exists() {
+            record_in([2, 3, 4], 20, &file, &case(set, steps), steps, ranks, how);
+        }
+    }
+}
+
+#[test]
+fn a_scene_is_measured_on_a_recording() {
+    let bytes = recorded("scene", &[("record.first", "4")], 6, [1, 1]);
+    let config = case(&[], 6);
+    let mut m = Moments::new(open(&bytes).unwrap()).unwrap();
+    let s = recorded_scene(&mut m, &config).unwrap();
+    // 500 spheres of 0.8 mm and 1000 kg/m3 in 20 x 20 x 40 mm
+    assert_eq!((s.particles.mean, s.cells), (500.0, Some(250)));
+    assert!((s.diameter.mean / 8e-4 - 1.0).abs() < 1e-12 && (s.density.mean / 1000.0 - 1.0).abs() < 1e-12);
+    let phi = 500.0 * std::f64::consts::PI / 6.0 * 5.12e-10 / 1.6e-5;
+    assert!((s.solid_fraction.unwrap() / phi - 1.0).abs() < 1e-9);
+    assert!((s.mass_loading().unwrap() / (phi * 1000.0 / ((1.0 - phi) * 1.2)) - 1.0).abs() < 1e-9);
+    assert!((s.stokes_time() / (1000.0 * 6.4e-7 / (18.0 * 1.2 * 1.5e-5)) - 1.0).abs() < 1e-12, "R eq. 9");
+    // the relaxation time of the law lies below Stokes', tau_f = tau_p rho_f (1 - phi)/(rho_p phi) in the mean
+    assert!(s.relaxation.mean < s.stokes_time());
+    let tau_f = s.relaxation.mean * 1.2 * (1.0 - phi) / (1000.0 * phi);
+    assert!((s.fluid_relaxation.unwrap() / tau_f - 1.0).abs() < 0.3, "{:?} {tau_f}", s.fluid_relaxation);
+    let term = |name: &str| s.terms.iter().find(|t| t.name == name).unwrap();
+    let weight = 1000.0 * 9.81;
+    assert!(term("Archimedes").relative <= 1.2e-3 * (1.0 + 1e-9));
+    // the pressure gradient was made 50 sin(0.3 id) Pa/m: rms 35 against the larger of drag and weight
+    let p = term("pressure gradient");
+    assert!(p.relative > 0.2 * 35.0 / weight && p.relative < 1.01 * 50.0 / weight, "{p:?}");
+    assert_eq!(decide::choose(term("Archimedes"), 1e-5), decide::Choice::On);
+    assert_eq!(decide::choose(term("Archimedes"), 1e-1), decide::Choice::Off);
+    assert_eq!(decide::choose(term("history (Basset)"), 1e-9), decide::Choice::Missing);
+    assert!(decide::advice(&s, 1e-5).iter().any(|a| a.contains("forces.lift = \"loth\"")));
+}
+
+#[test]
+fn a_recording_is_exported_as_series_and_tables() {
+    let bytes = recorded("export", &[("record.every", "2")], 5, [2, 2]);
+    let folder = std::env::temp_dir().join(format!("voidage-export-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    let mut m = Moments::new(open(&bytes).unwrap()).unwrap();
+    assert_eq!(export(&mut m, &folder.join("csv"), Format::Csv, 1).unwrap(), (3, 6));
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+    let table = |text: &str| -> Vec<Vec<String>> {
+        text.lines().map(|l| l.split(',').map(str::to_owned).collect()).collect()
+    };
+    let (cells, particles) = (table(&read("csv/cells_0001.csv")), table(&read("csv/particles_0001.csv")));
+    assert_eq!((cells.len(), particles.len()), (251, 501));
+    assert!(cells.iter().all(|r| r.len() == cells[0].len()));
+    // the solids of the cells are those of the particles
+    let column = |t: &[Vec<String>], name: &str| -> Vec<f64> {
+        let c = t[0].iter().position(|n| n == name).unwrap();
+        t[1..].iter().map(|r| r[c].parse().unwrap()).collect()
+    };
+    let solids: f64 =
+        column(&cells, "voidage").iter().zip(column(&cells, "volume")).map(|(e, v)| (1.0 - e) * v).sum();
+    let spheres: f64 = column(&particles, "radius").iter().map(|r| 4.0 / 3.0 * std::f64::consts::PI * r.powi(3)).sum();
+    assert!((solids / spheres - 1.0).abs() < 1e-12);
+    let x = m.exchange(2).unwrap().unwrap().particles().unwrap();
+    assert_eq!(column(&particles, "velocity_z"), x.velocity.iter().map(|v| v[2]).collect::<Vec<_>>());
+    assert_eq!(table(&read("csv/exchanges.csv"))[2], ["1", "2", "0.0004"]);
+    assert_eq!(table(&read("csv/monitor.csv")).len(), 7, "rows of all exchanges");
+    let mut m = Moments::new(open(&bytes).unwrap()).unwrap();
+    assert_eq!(export(&mut m, &folder.join("vtk"), Format::Vtk, 2).unwrap(), (2, 6));
+    assert_eq!(read("vtk/cells.pvd").matches("<DataSet").count(), 2);
+    assert!(folder.join("vtk/particles_0001.vtp").exists());
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn the_forecast_bounds_the_size() {
+    for set in [ALL, &[("record.every", "4"), ("coupling.scheme", "conservative-adaptive")]] {
+        let c = case(set, 9);
+        let s = Scratch::new("forecast");
+        record(&s.0, &c, 9, [1, 1], Compression::None);
+        let size = s.bytes().len() as f64;
+        let mut f = forecast::of(&c, 500, 250);
+        // the made DEM sends its last interval always, and neither type nor spin
+        if !set.iter().any(|s| s.1.contains("adaptive")) {
+            f.total += f.exchanges * 500 * 8 * 10;
+        }
+        assert!(size <= f.total as f64 && size > 0.7 * f.total as f64, "{size} {f:?}");
+    }
 }

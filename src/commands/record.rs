@@ -79,8 +79,8 @@ pub(super) fn start(c: &Config, session: &Session, resume: Option<&State>) -> Re
 pub(super) fn finish(recorder: Option<&Recorder>, result: &Result<(), String>) -> Result<(), String> {
     let Some(r) = recorder else { return Ok(()) };
     match r.finish() {
-        Ok(bytes) => {
-            println!("recording: {}", sizes::bytes(bytes));
+        Ok((bytes, spent)) => {
+            println!("recording: {}, {:.3} s of the coupler's time", sizes::bytes(bytes), spent.as_secs_f64());
             Ok(())
         }
         Err(e) if result.is_ok() => Err(e.to_string()),

@@ -21,8 +21,9 @@ pub fn scene(c: &Config) -> Result<Scene, String> {
             f.dem.script.display()
         )
     };
-    let d = 2.0 * s.radius.ok_or_else(|| need("diameter"))?;
-    let density = s.density.ok_or_else(|| need("density"))?;
+    let of_data = s.data.as_ref().and_then(|f| script::spheres(f));
+    let d = s.radius.map(|r| 2.0 * r).or(of_data.map(|d| d.0)).ok_or_else(|| need("diameter"))?;
+    let density = s.density.or(of_data.map(|d| d.1)).ok_or_else(|| need("density"))?;
     let (rho, nu, g) = (f.fluid.density, f.fluid.kinematic_viscosity, norm(f.fluid.gravity));
     let extent = foam::extent(&c.fluid_case());
     let side = |e: &foam::Extent| [0, 1, 2].map(|a| e.upper[a] - e.lower[a]);

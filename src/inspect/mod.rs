@@ -150,7 +150,8 @@ impl fmt::Display for Scene {
         })?;
         row("cells", self.cells.map_or("not known".into(), |n| n.to_string()))?;
         if let Some([l, u]) = self.bounds {
-            row("mesh, m", format!("{l:?} to {u:?}"))?;
+            let short = |v: [f64; 3]| v.map(|x| (x * 1e9).round() / 1e9);
+            row("mesh, m", format!("{:?} to {:?}", short(l), short(u)))?;
         }
         row("particle diameter, m", self.diameter.to_string())?;
         row("particle density, kg/m3", self.density.to_string())?;

@@ -46,6 +46,8 @@ struct Forces {
     viscous: Rms,
     added: Rms,
     history: Rms,
+    /// Σ of what a lasting mean acceleration would give, and its number
+    lasting: (V, f64),
     lift: Rms,
     magnus: Rms,
     stress: Rms,
@@ -213,9 +215,12 @@ fn one<R: Read + Seek>(
             None => [0, 1, 2].map(|a| along[a] - (k * slip[a] + drive.force[i][a]) / mass - f.fluid.gravity[a]),
         };
         x.added.add(0.5 * rho * v * norm(relative));
-        let remembered = if k > 0.0 { mass / k } else { s.period };
-        let basset = ratio.powi(3) * forces::history::coefficient(primary, rho, nu);
-        x.history.add(basset * 2.0 * remembered.sqrt() * norm(relative));
+        // the mean acceleration lasts as long as the slip relaxes, what differs from particle to particle one step
+        let basset = 2.0 * ratio.powi(3) * forces::history::coefficient(primary, rho, nu);
+        let remembered = if k > 0.0 { (mass / k).max(s.period) } else { s.period };
+        x.history.add(basset * s.period.sqrt() * norm(relative));
+        (0..3).for_each(|a| x.lasting.0[a] += basset * remembered.sqrt() * relative[a]);
+        x.lasting.1 += 1.0;
         let vorticity = [grad[2][1] - grad[1][2], grad[0][2] - grad[2][0], grad[1][0] - grad[0][1]];
         let shear = lift::Shear { diameter: primary, slip, vorticity, kinematic_viscosity: nu, density: rho };
         let law = lift::all().iter().find(|l| l.name() == "loth");
@@ -291,7 +296,9 @@ fn terms(s: &mut Scene, x: &Forces, c: &Config) {
         Some("forces.added_mass = 0.5"),
         Some("forces.added_mass = 0"),
     );
-    put("history (Basset)", x.history.value() / scale, to, "acceleration lasting m/K", false, None, None);
+    let lasting = norm(x.lasting.0) / x.lasting.1.max(1.0);
+    let history = x.history.value().hypot(lasting) / scale;
+    put("history (Basset)", history, to, "mean acceleration lasting m/K, rest one step", false, None, None);
     put(
         "lift",
         x.lift.value() / scale,

@@ -101,11 +101,21 @@ fn table(mut file: impl Write, n: usize, columns: &[(&str, Data)]) -> io::Result
                 file.write_all(b",")?;
             }
             match data {
-                Data::Scalar(v) => write!(file, "{}", v[i])?,
-                Data::Vector(v) => write!(file, "{},{},{}", v[i][0], v[i][1], v[i][2])?,
+                Data::Scalar(v) => number(&mut file, v[i])?,
+                Data::Vector(v) => {
+                    number(&mut file, v[i][0])?;
+                    for x in &v[i][1..] {
+                        file.write_all(b",")?;
+                        number(&mut file, *x)?;
+                    }
+                }
             }
         }
         file.write_all(b"\n")?;
     }
     file.flush()
+}
+
+fn number(file: &mut impl Write, x: f64) -> io::Result<()> {
+    if x == 0.0 || (1e-4..1e15).contains(&x.abs()) { write!(file, "{x}") } else { write!(file, "{x:e}") }
 }

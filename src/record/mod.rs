@@ -8,6 +8,7 @@
 
 pub mod chunk;
 pub mod compare;
+pub mod exercise;
 pub mod forecast;
 pub mod head;
 pub mod moment;

@@ -112,9 +112,12 @@ impl Messages {
         let (su, solids_flux) = (vector(field::SU), vector(field::SOLIDS_FLUX));
         Ok(Sources { voidage, voidage_old, solids_flux, sp, su })
     }
-    /// The reply to the DEM, particles as in `p`; empty arrays if there is none.
+    /// The reply to the DEM, particles as in `p`; empty arrays if there is none, or a part of it is missing.
     pub fn drive(&self, p: &Particles) -> Result<Drive, RecordError> {
         let mut a = self.particle_arrays(p)?;
+        if a.len() < DRIVE.len() {
+            return Ok(Drive::default());
+        }
         let drag_coefficient = a.remove(&field::DRAG_COEFFICIENT).unwrap_or_default();
         let mut vector = |name| vectors(a.remove(&name).unwrap_or_default());
         let (velocity, force, charged) =

@@ -304,10 +304,13 @@ pub fn replay<R: Read + Seek + 'static>(
     let cfd_ends = (0..cfd).map(|r| end(dem + r, "CFD", r)).collect();
     let mut partners = Partners::new(dem_ends, cfd_ends, Duration::from_secs(1));
     partners.of_a_recording();
-    let told = |e: &dyn std::fmt::Display| match player.borrow_mut().error.take() {
-        Some(e) => ReplayError::Record(e),
-        None if player.borrow().ended => ReplayError::Record(RecordError::NoExchange),
-        None => ReplayError::Run(e.to_string()),
+    let told = |e: &dyn std::fmt::Display| {
+        let mut p = player.borrow_mut();
+        match p.error.take() {
+            Some(e) => ReplayError::Record(e),
+            None if p.ended => ReplayError::Record(RecordError::NoExchange),
+            None => ReplayError::Run(e.to_string()),
+        }
     };
     partners.meet(&session.token, Duration::from_secs(3600)).map_err(|e| told(&e))?;
     let welcome = setup::welcome(&config, None);

@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 use voidage_wire::{Frame, kind};
 
 /// Messages that may wait for the disk.
@@ -76,6 +77,8 @@ struct Inner {
     spare: Receiver<Vec<u64>>,
     thread: Option<JoinHandle<Result<u64, RecordError>>>,
     path: PathBuf,
+    /// what recording took of the exchange
+    spent: Duration,
 }
 
 /// Handle of a recording under way; clones share it.
@@ -101,7 +104,7 @@ impl Recorder {
         let (back, spare) = sync_channel(QUEUE);
         let target = path.to_path_buf();
         let thread = std::thread::spawn(move || writer(file, target, how, &todo, &back));
-        let inner = Inner { selection, last: None, jobs: Some(jobs), spare, thread: Some(thread), path: path.into() };
+        let inner = Inner { selection, last: None, jobs: Some(jobs), spare, thread: Some(thread), path: path.into(), spent: Duration::ZERO };
         let this = Self(Rc::new(RefCell::new(inner)));
         let mut words = vec![0u64; text.len().div_ceil(8)];
         bytemuck::cast_slice_mut::<u64, u8>(&mut words)[..text.len()].copy_from_slice(text.as_bytes());
@@ -144,10 +147,13 @@ impl Recorder {
         if of_exchange && !self.0.borrow().selection.takes(step) {
             return Ok(());
         }
+        let begin = Instant::now();
         let mut copy = self.0.borrow().spare.try_recv().unwrap_or_default();
         copy.clear();
         copy.extend_from_slice(words);
-        self.put(Head::Message { partner, sent, kind, step }, copy)
+        self.put(Head::Message { partner, sent, kind, step }, copy)?;
+        self.0.borrow_mut().spent += begin.elapsed();
+        Ok(())
     }
 
     /// A row of the monitor.
@@ -173,9 +179,9 @@ impl Recorder {
         RecordError::File { what, source: std::io::Error::other(why.to_string()) }
     }
 
-    /// Ends the file with its index; bytes written.
-    pub fn finish(&self) -> Result<u64, RecordError> {
-        self.join()
+    /// Ends the file with its index; bytes written, and what recording took of the exchanges.
+    pub fn finish(&self) -> Result<(u64, Duration), RecordError> {
+        Ok((self.join()?, self.0.borrow().spent))
     }
 }
 

@@ -175,10 +175,23 @@ fn cfd(mut t: Memory, rank: u32, size: u32, piece: MeshPiece, steps: i64) {
 
 /// A recorded run of `steps` exchanges with 500 particles; cells and particles on as many ranks as told.
 pub fn record(file: &Path, c: &Config, steps: i64, ranks: [usize; 2], how: Compression) -> Summary {
+    record_in([5, 5, 10], 500, file, c, steps, ranks, how)
+}
+
+/// The same with another number of cells and particles.
+pub fn record_in(
+    cells: [usize; 3],
+    particles: usize,
+    file: &Path,
+    c: &Config,
+    steps: i64,
+    ranks: [usize; 2],
+    how: Compression,
+) -> Summary {
     let [dem_ranks, cfd_ranks] = ranks;
-    let box_ = Hex { n: [5, 5, 10], size: SIZE, jiggle: 0.2, cyclic_x: true };
-    let pieces = box_.pieces(cfd_ranks, |cell| cell[2] * cfd_ranks / 10);
-    let all = cloud(500, SIZE, 4e-4);
+    let box_ = Hex { n: cells, size: SIZE, jiggle: 0.2, cyclic_x: true };
+    let pieces = box_.pieces(cfd_ranks, |cell| cell[2] * cfd_ranks / cells[2]);
+    let all = cloud(particles, SIZE, 4e-4);
     let (mut ends, mut threads) = (Vec::new(), Vec::new());
     for rank in 0..dem_ranks {
         let (partner, end) = memory::pair("DEM", "coupler");
