@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! A scene expected from the files of a case, before any run: one kind of sphere, evenly spread.
 //!
-//! Reads what `config::foam` and `config::script` find. The slip is the fastest velocity of 0/U, or the terminal velocity of
-//! one sphere where that is slower. Magnitudes are bounds or estimates and say so.
+//! Reads what `config::foam` and `config::script` find. The slip is the fastest velocity of 0/U, or the terminal velocity at
+//! the mean solid fraction where that is larger. Magnitudes are bounds or estimates and say so.
 
 use super::{Range, Scene, Term};
 use crate::config::{Config, Continuity, Feedback, GravityTreatment, Model, foam, script};
@@ -43,7 +43,7 @@ pub fn scene(c: &Config) -> Result<Scene, String> {
     let (mut low, mut high) = (0.0, 1e3);
     for _ in 0..200 {
         let u = 0.5 * (low + high);
-        if k(u, 1.0) * u < net { low = u } else { high = u }
+        if k(u, 1.0 - mean) * u < net { low = u } else { high = u }
     }
     let fastest = foam::start(&c.fluid_case()).map_or(0.0, |s| s.0);
     let slip = fastest.max(low);
