@@ -167,7 +167,8 @@ fn main() {
     let found = folder.join("found");
     let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/fuzz");
     std::fs::create_dir_all(&kept).expect("target/fuzz");
-    let mut files: Vec<PathBuf> = std::fs::read_dir(&folder).expect("the corpus").flatten().map(|e| e.path()).collect();
+    let mut files: Vec<PathBuf> =
+        std::fs::read_dir(&folder).expect("the corpus").flatten().map(|e| e.path()).collect();
     files.retain(|f| f.extension().is_some_and(|e| e == "voidage"));
     files.sort();
     let corpus: Vec<(Vec<u8>, Vec<Chunk>)> = files
@@ -194,7 +195,8 @@ fn main() {
     });
     std::panic::set_hook(Box::new(|p| {
         if let Some(l) = p.location() {
-            *PLACE.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = format!("{}:{}", l.file(), l.line());
+            *PLACE.lock().unwrap_or_else(std::sync::PoisonError::into_inner) =
+                format!("{}:{}", l.file(), l.line());
         }
     }));
     let (begin, mut r) = (Instant::now(), Random(seed));
@@ -251,6 +253,10 @@ fn main() {
             break;
         }
     }
-    println!("{n} files in {seconds} s (seed {seed}): {good} read whole, {} kinds of errors, {bad} panics, at most {} MB", kinds.len(), peak());
+    println!(
+        "{n} files in {seconds} s (seed {seed}): {good} read whole, {} kinds of errors, {bad} panics, at most {} MB",
+        kinds.len(),
+        peak()
+    );
     std::process::exit(i32::from(bad > 0));
 }

@@ -8,7 +8,7 @@
 use crate::arrange::Places;
 use crate::mesh::NONE;
 use crate::scheme::History;
-use crate::threads;
+use crate::{sums, threads};
 use std::f64::consts::PI;
 use thiserror::Error;
 use voidage_wire::{Frame, WireError, field};
@@ -163,12 +163,10 @@ impl Particles {
     }
 
     fn check(&self) -> Result<(), ParticleError> {
-        // any NaN or infinity times zero is NaN
-        let zero = |v: &[f64]| v.iter().map(|x| x * 0.0).sum::<f64>() == 0.0;
         let vectors = [&self.position, &self.velocity, &self.ledger];
-        let positive = |v: &[f64]| v.iter().all(|x| *x > 0.0);
-        let good = vectors.iter().all(|v| zero(v.as_flattened()))
-            && [&self.radius, &self.mass].iter().all(|v| zero(v) && positive(v));
+        let positive = |v: &[f64]| v.iter().fold(true, |all, x| all & (*x > 0.0));
+        let good = vectors.iter().all(|v| sums::finite(v.as_flattened()))
+            && [&self.radius, &self.mass].iter().all(|v| sums::finite(v) && positive(v));
         if good && self.history.drag_coefficient.is_empty() {
             return Ok(());
         }

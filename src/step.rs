@@ -18,7 +18,7 @@ use crate::mesh::{Mesh, NONE};
 use crate::particles::{Particles, Spare};
 use crate::scheme::{Before, Cells, Scheme};
 use crate::smooth::{Active, Direction, Field, Scratch, Smoother};
-use crate::sums::{Sums, norm};
+use crate::sums::{self, Sums, norm};
 use crate::threads;
 use std::time::Instant;
 use thiserror::Error;
@@ -175,6 +175,16 @@ pub struct Seconds {
     pub sources: f64,
     pub gather: f64,
     pub drive: f64,
+}
+
+/// Particles whose drag is computed together.
+#[derive(Default)]
+struct Batch {
+    slips: Vec<Slip>,
+    /// u − v, m/s
+    vectors: Vec<[f64; 3]>,
+    /// K, kg/s
+    drag: Vec<f64>,
 }
 
 /// The coupling step of one run.
@@ -509,9 +519,9 @@ impl CouplingStep {
         let mut out = std::mem::take(&mut self.predicted);
         let parts = threads::cut(&mut out, pieces.iter().map(|p| p.particles.end));
         threads::map(pieces.iter().zip(parts).collect(), |(piece, out)| {
-            let begin = piece.particles.start;
+            let (begin, mut batch) = (piece.particles.start, Batch::default());
             for (k, out) in out.chunks_mut(BATCH).enumerate() {
-                self.predict_batch(p, begin + k * BATCH, first, out);
+                self.predict_batch(p, begin + k * BATCH, first, &mut batch, out);
             }
         });
         self.predicted = out;
@@ -521,13 +531,13 @@ impl CouplingStep {
     }
 
     /// `predict` for the particles from `begin` on.
-    fn predict_batch(&self, p: &Particles, begin: usize, first: bool, out: &mut [Predicted]) {
+    fn predict_batch(&self, p: &Particles, begin: usize, first: bool, b: &mut Batch, out: &mut [Predicted]) {
         let s = &self.setup;
         let (around, ratio) = (s.drag.looks_around(), s.extra.ratio);
         let parcel = ratio * ratio * ratio;
-        let (mut slips, mut drag) = ([Slip::default(); BATCH], [0.0; BATCH]);
-        let (slips, drag) = (&mut slips[..out.len()], &mut drag[..out.len()]);
-        let mut slip = [[0.0; 3]; BATCH];
+        b.slips.clear();
+        b.vectors.clear();
+        b.drag.resize(out.len(), 0.0);
         for k in 0..out.len() {
             let i = begin + k;
             let l = self.weights.gather(&self.work, i);
@@ -544,31 +554,33 @@ impl CouplingStep {
                 p.position[i],
                 gathered,
             );
-            slip[k] = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
+            let vector = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
             out[k].defect = [0, 1, 2].map(|a| u[a] - gathered[a]);
-            slips[k] = Slip {
+            let slip = Slip {
                 diameter: 2.0 * p.radius[i] / ratio,
                 voidage,
-                speed: norm(slip[k]),
+                speed: norm(vector),
                 kinematic_viscosity: s.kinematic_viscosity,
                 density: s.density,
             };
             if around {
                 let (sauter_diameter, cell_volume) = (l[0] / (l[7] * ratio), self.mesh.volume[host]);
                 let around = Around { sauter_diameter, cell_volume };
-                drag[k] = s.drag.drag_coefficient_in(&slips[k], &around);
+                b.drag[k] = s.drag.drag_coefficient_in(&slip, &around);
             }
+            b.slips.push(slip);
+            b.vectors.push(vector);
         }
         if !around {
-            s.drag.coefficients(slips, drag);
+            s.drag.coefficients(&b.slips, &mut b.drag);
         }
         for k in 0..out.len() {
             let i = begin + k;
-            let share = if s.model_b { parcel / slips[k].voidage } else { parcel };
+            let share = if s.model_b { parcel / b.slips[k].voidage } else { parcel };
             let (v, inertia) = (p.velocity[i], p.mass[i]);
             let last = p.history.last(i, v, inertia, s.gravity, s.period);
-            let drag_coefficient = drag[k] * share;
-            let before = Before { drag_coefficient, slip: slip[k], inertia, period: s.period, last };
+            let drag_coefficient = b.drag[k] * share;
+            let before = Before { drag_coefficient, slip: b.vectors[k], inertia, period: s.period, last };
             out[k] = Predicted::new(s.scheme, &before, out[k].defect);
         }
     }
@@ -650,13 +662,13 @@ impl CouplingStep {
                     let inner = if s.pressure_force { [3, 4, 5].map(|a| -v * g[a]) } else { [0.0; 3] };
                     let force = [0, 1, 2].map(|a| inner[a] + outer[a]);
                     let slip = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
-                    let mut charged = [0.0; 3];
-                    let mut external = [0.0; 3];
-                    if !first {
-                        charged =
-                            [0, 1, 2].map(|a| s.period * (q.implicit * slip[a] + q.explicit[a] + force[a]));
-                        external = outer.map(|x| s.period * x);
-                    }
+                    let external = outer.map(|x| s.period * x);
+                    // exchange 0: no fluid step bears the interval, the ledger does; but not what has no reaction
+                    let charged = if first {
+                        external
+                    } else {
+                        [0, 1, 2].map(|a| s.period * (q.implicit * slip[a] + q.explicit[a] + force[a]))
+                    };
                     let (j, l, e) = (charged, ledger(i), external);
                     let size = norm([0, 1, 2].map(|a| j[a] + l[a]));
                     sums.add([j[0], j[1], j[2], l[0], l[1], l[2], e[0], e[1], e[2], size]);
@@ -708,18 +720,11 @@ impl CouplingStep {
     }
 
     fn take_fluid(&mut self, fluid: &Fluid) -> Result<(), StepError> {
-        // any NaN or infinity times zero is NaN
-        let zero = |field: &Vec<[f64; 3]>| {
-            let chunks = field.as_flattened().chunks(3 * 8192).collect();
-            let sums = threads::map(chunks, |c: &[f64]| {
-                let (lanes, rest) = c.as_chunks::<8>();
-                let mut sum = [0.0; 8];
-                lanes.iter().for_each(|l| (0..8).for_each(|a| sum[a] += l[a] * 0.0));
-                sum.iter().sum::<f64>() + rest.iter().map(|x| x * 0.0).sum::<f64>()
-            });
-            sums.iter().sum::<f64>() == 0.0
+        let finite = |field: &Vec<[f64; 3]>| {
+            let chunks = field.as_flattened().chunks(24 * 1024).collect();
+            threads::map(chunks, sums::finite).iter().all(|f| *f)
         };
-        if ![&fluid.velocity, &fluid.pressure_gradient, &fluid.stress_divergence].into_iter().all(zero) {
+        if ![&fluid.velocity, &fluid.pressure_gradient, &fluid.stress_divergence].into_iter().all(finite) {
             return Err(self.not_finite(fluid));
         }
         self.fluid_velocity.clone_from(&fluid.velocity);

@@ -70,6 +70,15 @@ pub fn sum3(values: impl IntoIterator<Item = [f64; 3]>) -> [f64; 3] {
     s.value()
 }
 
+/// Is every number finite?
+pub fn finite(values: &[f64]) -> bool {
+    // NaN or infinity times zero is NaN; eight chains at once
+    let (lanes, rest) = values.as_chunks::<8>();
+    let mut sum = [0.0; 8];
+    lanes.iter().for_each(|l| (0..8).for_each(|a| sum[a] += l[a] * 0.0));
+    sum.iter().sum::<f64>() + rest.iter().map(|x| x * 0.0).sum::<f64>() == 0.0
+}
+
 /// Length of a vector.
 pub fn norm(v: [f64; 3]) -> f64 {
     (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
@@ -77,6 +86,18 @@ pub fn norm(v: [f64; 3]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn a_number_that_is_none_is_found_anywhere() {
+        for n in [1, 8, 21] {
+            assert!(super::finite(&vec![-3.0; n]));
+            for (i, bad) in (0..n).flat_map(|i| [f64::NAN, f64::NEG_INFINITY].map(|b| (i, b))) {
+                let mut v = vec![1e300; n];
+                v[i] = bad;
+                assert!(!super::finite(&v), "{i} of {n}");
+            }
+        }
+    }
+
     #[test]
     fn a_million_tenths_lose_nothing() {
         let exact = 100_000.0;

@@ -39,7 +39,8 @@ impl Case {
         let control = path.join("fluid/system/controlDict");
         let text = std::fs::read_to_string(&control).unwrap();
         assert!(text.contains(&format!("endTime {was};")));
-        std::fs::write(&control, text.replace(&format!("endTime {was};"), &format!("endTime {end};"))).unwrap();
+        std::fs::write(&control, text.replace(&format!("endTime {was};"), &format!("endTime {end};")))
+            .unwrap();
         Self(path)
     }
     fn path(&self, name: &str) -> String {
@@ -72,7 +73,10 @@ fn the_fluidised_bed_replays_to_the_bit_on_one_and_four_threads() {
     let file = c.path("recording.voidage");
     for threads in ["run.threads=1", "run.threads=4"] {
         let told = done(&["replay", &file, "--set", threads]);
-        assert!(told.contains("11 exchanges, 0 to 10") && told.contains("all replies are bit-identical"), "{told}");
+        assert!(
+            told.contains("11 exchanges, 0 to 10") && told.contains("all replies are bit-identical"),
+            "{told}"
+        );
     }
     let told = done(&["replay", &file, "--set", "smooth.tolerance=1e-6"]);
     assert!(told.contains("the replies differ"), "{told}");
@@ -98,7 +102,10 @@ fn a_restarted_run_is_recorded_and_replays_to_the_bit() {
     set("endTime 0.002;", "endTime 0.003;");
     done(&["run", &case, "--restart", "--set", "record.every=2"]);
     let told = done(&["replay", &c.path("recording-from-0.002.voidage")]);
-    assert!(told.contains("2 exchanges, 12 to 14") && told.contains("all replies are bit-identical"), "{told}");
+    assert!(
+        told.contains("2 exchanges, 12 to 14") && told.contains("all replies are bit-identical"),
+        "{told}"
+    );
 }
 
 #[test]
@@ -110,7 +117,10 @@ fn a_killed_run_leaves_a_recording_to_its_last_whole_exchange() {
     let begin = Instant::now();
     let rows = || std::fs::read_to_string(c.path("monitor.csv")).map_or(0, |t| t.lines().count());
     while rows() < 50 {
-        assert!(begin.elapsed() < Duration::from_secs(120) && run.try_wait().unwrap().is_none(), "the run did not start");
+        assert!(
+            begin.elapsed() < Duration::from_secs(120) && run.try_wait().unwrap().is_none(),
+            "the run did not start"
+        );
         std::thread::sleep(Duration::from_millis(20));
     }
     // the coupler itself, without warning
@@ -126,7 +136,10 @@ fn a_killed_run_leaves_a_recording_to_its_last_whole_exchange() {
     assert!(!run.wait().unwrap().success());
     let file = c.path("recording.voidage");
     let told = done(&["replay", &file]);
-    assert!(told.contains("the run was stopped while it was recorded") && told.contains("bit-identical"), "{told}");
+    assert!(
+        told.contains("the run was stopped while it was recorded") && told.contains("bit-identical"),
+        "{told}"
+    );
     let told = done(&["export", &file, "--into", &c.path("csv"), "--format", "csv", "--every", "20"]);
     assert!(told.contains("rows of the monitor"), "{told}");
 }

@@ -500,6 +500,37 @@ fn the_ledger_of_an_excluded_particle_waits() {
 }
 
 #[test]
+fn what_has_no_reaction_never_reaches_the_fluid_not_even_in_the_first_interval() {
+    let mesh = assemble(&meshes()[0].whole()).unwrap();
+    let none = || -> Box<dyn Smoother> { Box::new(Unsmoothed) };
+    for name in ["conservative", "explicit"] {
+        let s =
+            Setup { mean_pressure_gradient: [0.0, 7.0, -20.0], ..setup(name, FluidVelocity::Gather, false) };
+        let period = s.period;
+        let mut step = CouplingStep::new(mesh.clone(), s, Box::new(ParticleCentroid), none(), none());
+        let at_rest = |ledger| P { id: 1, x: [0.031, 0.022, 0.012], v: [0.0; 3], r: 1e-3, ledger };
+        let still = Fluid { velocity: vec![[0.0; 3]; mesh.len()], ..Fluid::default() };
+        let mut exchange = |p: P, first: bool| {
+            let words = message(&[p]);
+            let mut p = Particles::receive(&[Frame::parse(&words).unwrap()], &Places::default()).unwrap();
+            step.before_fluid(&mut p, first).unwrap();
+            step.after_fluid(&p, &still, first).unwrap();
+            (step.drive.force[0], step.drive.charged[0], step.sources.su.clone(), step.books)
+        };
+        // a held particle in fluid at rest takes Archimedes' force and that of the mean pressure gradient, no more
+        let (force, charged, _, books) = exchange(at_rest([0.0; 3]), true);
+        let v = 4.0 / 3.0 * std::f64::consts::PI * 1e-9;
+        assert!((force[2] / (v * (1.2 * 9.81 + 20.0)) - 1.0).abs() < 1e-12, "{force:?}");
+        let taken = force.map(|f| f * period);
+        assert_eq!(books.error(Some(charged)), 0.0);
+        // the fix: L = taken - charged
+        let ledger = [0, 1, 2].map(|a| taken[a] - charged[a]);
+        let (_, _, su, _) = exchange(at_rest(ledger), false);
+        assert!(su.iter().flatten().all(|x| *x == 0.0), "{name}: {ledger:?} was given to the fluid");
+    }
+}
+
+#[test]
 fn a_scheme_that_needs_the_last_interval_says_so() {
     let mesh = assemble(&meshes()[0].whole()).unwrap();
     let none = || -> Box<dyn Smoother> { Box::new(Unsmoothed) };
@@ -513,7 +544,11 @@ fn a_scheme_that_needs_the_last_interval_says_so() {
 }
 
 /// Bits of Sp, Su, ε and of each particle's reply (by id) after two exchanges on so many threads.
-fn bits_on(threads: usize, backwards: bool, mapping: &str) -> (Vec<[u64; 5]>, Vec<(i64, [u64; 10])>, [u64; 7]) {
+fn bits_on(
+    threads: usize,
+    backwards: bool,
+    mapping: &str,
+) -> (Vec<[u64; 5]>, Vec<(i64, [u64; 10])>, [u64; 7]) {
     use voidage::bench::{scene, step::setup};
     let mesh = scene::mesh(scene::BOX, 12_000);
     let air = scene::air(&mesh);

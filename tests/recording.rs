@@ -67,7 +67,8 @@ fn a_run_replays_to_the_bit_on_any_number_of_threads() {
 
 #[test]
 fn exchanges_without_their_predecessor_replay_to_the_bit() {
-    let set = &[("record.every", "3"), ("record.last", "2"), ("forces.added_mass", "0.5"), ("forces.lift", "loth")];
+    let set =
+        &[("record.every", "3"), ("record.last", "2"), ("forces.added_mass", "0.5"), ("forces.lift", "loth")];
     let bytes = recorded("every", set, 11, [2, 1]);
     let mut r = open(&bytes).unwrap();
     let (list, end) = r.exchanges().unwrap();
@@ -113,19 +114,33 @@ fn recordings_of_other_ranks_are_compared_by_cell_and_particle() {
 
 #[test]
 fn what_a_replay_cannot_change_is_refused() {
-    let bytes = recorded("refused", &[("record.first", "2"), ("coupling.model", "B"), ("forces.pressure_gradient", "false"), ("forces.viscous_stress", "false")], 3, [1, 1]);
+    let bytes = recorded(
+        "refused",
+        &[
+            ("record.first", "2"),
+            ("coupling.model", "B"),
+            ("forces.pressure_gradient", "false"),
+            ("forces.viscous_stress", "false"),
+        ],
+        3,
+        [1, 1],
+    );
     for (set, words) in [
         (("coupling.interval", "40"), "how the recorded programs ran"),
         (("output.picture", "x"), "how the recorded programs ran"),
         (("smooth.bandwith", "1e-3"), "did you mean smooth.bandwidth"),
         (("smooth.bandwidth", "0"), "smooth.bandwidth"),
         (("forces.drag", "wen"), "forces.drag = \"wen-yu\""),
-        (("coupling.scheme", "conservative-adaptive"), "need the history, which the recorded programs did not send"),
+        (
+            ("coupling.scheme", "conservative-adaptive"),
+            "need the history, which the recorded programs did not send",
+        ),
     ] {
         let e = again(&bytes, &[set]).unwrap_err().to_string();
         assert!(e.contains(words), "{set:?}: {e}");
     }
-    let a = [("coupling.model", "A"), ("forces.pressure_gradient", "true"), ("forces.viscous_stress", "true")];
+    let a =
+        [("coupling.model", "A"), ("forces.pressure_gradient", "true"), ("forces.viscous_stress", "true")];
     let e = again(&bytes, &a).unwrap_err().to_string();
     assert!(e.contains("need the pressure gradient"), "{e}");
     let o = again(&bytes, &[]).unwrap();
@@ -144,7 +159,8 @@ fn a_file_cut_anywhere_is_read_to_its_last_whole_exchange() {
     let bytes = recorded("cut", ALL, 3, [1, 1]);
     let (list, _) = open(&bytes).unwrap().exchanges().unwrap();
     let mut seed = 3;
-    let mut cuts: Vec<usize> = (0..60).map(|_| (common::random(&mut seed) * bytes.len() as f64) as usize).collect();
+    let mut cuts: Vec<usize> =
+        (0..60).map(|_| (common::random(&mut seed) * bytes.len() as f64) as usize).collect();
     cuts.extend([0, 1, 15, 16, 17, 63, 64, bytes.len() - 1, bytes.len() - 24, bytes.len() - 25]);
     for e in &list {
         cuts.extend([e.1 as usize - 1, e.1 as usize, e.1 as usize + 1]);
@@ -220,17 +236,31 @@ fn corpus() -> PathBuf {
 
 #[test]
 fn recordings_of_format_1_are_read_by_every_later_version() {
-    for (name, exchanges) in [("whole.voidage", 4), ("every-third.voidage", 4)] {
+    for (name, k, solids) in
+        [("whole.voidage", vec![0, 1, 2, 3], WHOLE), ("every-third.voidage", vec![0, 3, 6, 7], WHOLE)]
+    {
         let bytes = std::fs::read(corpus().join(name)).unwrap();
+        let mut m = Moments::new(open(&bytes).unwrap()).unwrap();
+        assert_eq!(m.exchanges.iter().map(|e| e.0).collect::<Vec<_>>(), k, "{name}");
+        // the solids of the last exchange, from the recorded voidage and from the recorded particles
+        let x = m.at(k.len() - 1).unwrap().unwrap();
+        let (p, q) = (x.particles().unwrap(), x.sources(&m.mesh).unwrap());
+        let cells: f64 = q.voidage.iter().zip(&m.mesh.volume).map(|(e, v)| (1.0 - e) * v).sum();
+        let spheres: f64 = (0..p.len()).map(|i| p.volume(i)).sum();
+        assert!(
+            (cells / solids - 1.0).abs() < 1e-9 && (spheres / solids - 1.0).abs() < 1e-9,
+            "{name}: {cells:e}"
+        );
+        // it replays; models may have changed since, what the step does with the solids has not
         let o = again(&bytes, &[]).unwrap();
-        assert_eq!((o.exchanges, o.cut), (exchanges, None), "{name}");
-        assert_eq!(o.comparison.arrays.len(), 8, "{name}");
-        // a later version may round otherwise, not more
-        for d in o.comparison.arrays.values() {
-            assert!(d.relative() < 1e-10, "{name}: {}", o.comparison);
-        }
+        assert_eq!((o.exchanges, o.cut), (k.len() as u64, None), "{name}");
+        let voidage = &o.comparison.arrays[&voidage_wire::field::VOIDAGE];
+        assert!(voidage.relative() < 1e-6, "{name}: {}", o.comparison);
     }
 }
+
+/// 20 spheres of 0.8 mm, m3.
+const WHOLE: f64 = 20.0 * 4.0 / 3.0 * std::f64::consts::PI * 6.4e-11;
 
 #[test]
 fn files_that_once_made_trouble_end_in_a_result() {
@@ -313,7 +343,8 @@ fn a_recording_is_exported_as_series_and_tables() {
     };
     let solids: f64 =
         column(&cells, "voidage").iter().zip(column(&cells, "volume")).map(|(e, v)| (1.0 - e) * v).sum();
-    let spheres: f64 = column(&particles, "radius").iter().map(|r| 4.0 / 3.0 * std::f64::consts::PI * r.powi(3)).sum();
+    let spheres: f64 =
+        column(&particles, "radius").iter().map(|r| 4.0 / 3.0 * std::f64::consts::PI * r.powi(3)).sum();
     assert!((solids / spheres - 1.0).abs() < 1e-12);
     let x = m.exchange(2).unwrap().unwrap().particles().unwrap();
     assert_eq!(column(&particles, "velocity_z"), x.velocity.iter().map(|v| v[2]).collect::<Vec<_>>());

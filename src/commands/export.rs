@@ -22,9 +22,15 @@ pub fn export(file: &Path, into: Option<&Path>, format: &str, every: usize) -> u
         eprintln!("error: --every 0: a number of exchanges, at least 1; type --every 10");
         return BAD_INPUT;
     }
-    let folder = into.map_or_else(|| PathBuf::from(format!("{}-{format}", file.with_extension("").display())), Path::to_path_buf);
+    let folder = into.map_or_else(
+        || PathBuf::from(format!("{}-{format}", file.with_extension("").display())),
+        Path::to_path_buf,
+    );
     if folder.read_dir().is_ok_and(|mut d| d.next().is_some()) {
-        eprintln!("error: {}: the folder is not empty; remove it or name another: --into FOLDER", folder.display());
+        eprintln!(
+            "error: {}: the folder is not empty; remove it or name another: --into FOLDER",
+            folder.display()
+        );
         return BAD_INPUT;
     }
     let mut moments = match Reader::open(file).and_then(Moments::new) {

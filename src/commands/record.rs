@@ -52,7 +52,11 @@ pub(super) fn before(c: &Config, from: Option<f64>) -> Result<(), Problem> {
 }
 
 /// Begins the recording of a run, if its case asks for one.
-pub(super) fn start(c: &Config, session: &Session, resume: Option<&State>) -> Result<Option<Recorder>, String> {
+pub(super) fn start(
+    c: &Config,
+    session: &Session,
+    resume: Option<&State>,
+) -> Result<Option<Recorder>, String> {
     let selection = Selection::of(c);
     if !selection.any() {
         return Ok(None);
@@ -80,7 +84,11 @@ pub(super) fn finish(recorder: Option<&Recorder>, result: &Result<(), String>) -
     let Some(r) = recorder else { return Ok(()) };
     match r.finish() {
         Ok((bytes, spent)) => {
-            println!("recording: {}, {:.3} s of the coupler's time", sizes::bytes(bytes), spent.as_secs_f64());
+            println!(
+                "recording: {}, {:.3} s of the coupler's time",
+                sizes::bytes(bytes),
+                spent.as_secs_f64()
+            );
             Ok(())
         }
         Err(e) if result.is_ok() => Err(e.to_string()),
@@ -105,12 +113,7 @@ pub(super) fn of_file(file: &Path, e: RecordError) -> u8 {
 }
 
 /// `voidage replay FILE`
-pub fn replay(
-    file: &Path,
-    set: &[String],
-    compare: Option<&Path>,
-    save: Option<&Path>,
-) -> u8 {
+pub fn replay(file: &Path, set: &[String], compare: Option<&Path>, save: Option<&Path>) -> u8 {
     let set = match overrides(set) {
         Ok(s) => s,
         Err(p) => {
@@ -161,7 +164,9 @@ fn report(o: &Outcome, file: &Path, compare: Option<&Path>, set: &[(String, Stri
     let (first, last) = o.range.unwrap_or_default();
     println!("{}: {} exchanges, {first} to {last}", file.display(), o.exchanges);
     if let Some(at) = o.cut {
-        println!("the run was stopped while it was recorded: the file ends at byte {at}, after the exchanges above");
+        println!(
+            "the run was stopped while it was recorded: the file ends at byte {at}, after the exchanges above"
+        );
     }
     let per = 1e3 * o.summary.coupler / o.exchanges as f64;
     println!("coupler {per:.3} ms per exchange with reading; replay {wall:.2} s in all");

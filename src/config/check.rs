@@ -94,8 +94,11 @@ fn values(c: &Config, p: &mut Vec<Problem>) {
     if f.smooth.method != "none" || f.map.method == "kernel" {
         range("smooth.bandwidth", f.smooth.bandwidth, 1e-9, 1e3, "m");
     }
-    let counts =
-        [("run.dem_ranks", f.run.dem_ranks), ("run.cfd_ranks", f.run.cfd_ranks), ("run.threads", f.run.threads)];
+    let counts = [
+        ("run.dem_ranks", f.run.dem_ranks),
+        ("run.cfd_ranks", f.run.cfd_ranks),
+        ("run.threads", f.run.threads),
+    ];
     for (key, n) in counts {
         if n == 0 || n > 100_000 {
             p.push(Problem::error(key, n, "at least 1", format!("{key} = 1")));

@@ -333,13 +333,7 @@ pub struct Record {
 }
 impl Default for Record {
     fn default() -> Self {
-        Self {
-            every: 0,
-            first: 0,
-            last: 0,
-            file: "recording.voidage".into(),
-            compression: Compression::Lz4,
-        }
+        Self { every: 0, first: 0, last: 0, file: "recording.voidage".into(), compression: Compression::Lz4 }
     }
 }
 
@@ -348,7 +342,12 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("format", "", "-", "version of this file, 1"),
     ("run.dem_ranks", "", "1", "MPI ranks of the particle program"),
     ("run.cfd_ranks", "", "1", "MPI ranks of the fluid solver; the case is decomposed when needed"),
-    ("run.threads", "", "1", "threads of the coupler; the results do not depend on them. The partners wait meanwhile, so their cores are free"),
+    (
+        "run.threads",
+        "",
+        "1",
+        "threads of the coupler; the results do not depend on them. The partners wait meanwhile, so their cores are free",
+    ),
     ("fluid.case", "", "fluid", "OpenFOAM case, below the case folder"),
     ("fluid.solver", "", "voidageFoam", "voidageFoam, or a stock solver with fvOptions (dilute, model B)"),
     ("fluid.density", "kg/m3", "-", "density of the fluid"),
@@ -428,7 +427,12 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
         "2",
         "restart sets kept, written at the fluid's write times (voidage run --restart); 0: none",
     ),
-    ("record.every", "", "0", "record every n-th exchange; 1: all; 0: none (voidage replay, inspect, export)"),
+    (
+        "record.every",
+        "",
+        "0",
+        "record every n-th exchange; 1: all; 0: none (voidage replay, inspect, export)",
+    ),
     ("record.first", "", "0", "record the first n exchanges as well"),
     ("record.last", "", "0", "record the last n exchanges before endTime as well"),
     ("record.file", "", "recording.voidage", "the file, below the case folder; never overwritten"),

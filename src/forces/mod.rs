@@ -15,7 +15,7 @@ pub use drag::{DragOptions, all, build};
 pub use extra::Extra;
 
 /// What a drag law looks at; SI units.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slip {
     /// d, m
     pub diameter: f64,

@@ -64,11 +64,15 @@ pub fn advice(s: &Scene, accuracy: f64) -> Vec<String> {
                 list.push(format!("{size}, and is off: {}", t.on.unwrap_or("it has no key")));
             }
             (Choice::Missing, _) => {
-                list.push(format!("{size}: this version has no such term in live runs; expect an error of that size"));
+                list.push(format!(
+                    "{size}: this version has no such term in live runs; expect an error of that size"
+                ));
             }
             (Choice::Off, true) => {
                 if let Some(off) = t.off {
-                    list.push(format!("{size}, below the accuracy of {accuracy:.0e}: it could be off ({off})"));
+                    list.push(format!(
+                        "{size}, below the accuracy of {accuracy:.0e}: it could be off ({off})"
+                    ));
                 }
             }
             _ => {}
@@ -99,7 +103,10 @@ pub fn advice(s: &Scene, accuracy: f64) -> Vec<String> {
         ));
     }
     if s.dem_step > tau {
-        list.push(format!("the DEM step is longer than tau_p = {tau:.1e} s: dem.time_step = {:.0e}", 0.2 * tau));
+        list.push(format!(
+            "the DEM step is longer than tau_p = {tau:.1e} s: dem.time_step = {:.0e}",
+            0.2 * tau
+        ));
     }
     let (h, d, b) = (s.cell_size, s.diameter.mean, s.bandwidth);
     if !h.is_empty() {

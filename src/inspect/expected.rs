@@ -35,7 +35,8 @@ pub fn scene(c: &Config) -> Result<Scene, String> {
     let mean = phi.unwrap_or(0.0);
     let ratio = f.dem.coarse_graining;
     let k = |speed: f64, voidage: f64| {
-        let slip = forces::Slip { diameter: d / ratio, voidage, speed, kinematic_viscosity: nu, density: rho };
+        let slip =
+            forces::Slip { diameter: d / ratio, voidage, speed, kinematic_viscosity: nu, density: rho };
         ratio.powi(3) * law.drag_coefficient(&slip)
     };
     let weight = density * sphere * g;
@@ -75,9 +76,8 @@ pub fn scene(c: &Config) -> Result<Scene, String> {
         explicit: f.coupling.scheme == "explicit",
         ..Scene::default()
     };
-    scene.fluid_relaxation = phi
-        .filter(|p| *p > 0.0 && drag > 0.0)
-        .map(|p| rho * (1.0 - p) * sphere / (p * k(slip, 1.0 - mean)));
+    scene.fluid_relaxation =
+        phi.filter(|p| *p > 0.0 && drag > 0.0).map(|p| rho * (1.0 - p) * sphere / (p * k(slip, 1.0 - mean)));
     if let Some(p) = phi {
         scene.solid_fraction_seen.add(p);
     }

@@ -114,7 +114,8 @@ pub struct Scene {
 impl Scene {
     /// ρ_p d²/(18 η), s (R eq. 9).
     pub fn stokes_time(&self) -> f64 {
-        self.density.mean * self.diameter.mean.powi(2) / (18.0 * self.fluid_density * self.kinematic_viscosity)
+        self.density.mean * self.diameter.mean.powi(2)
+            / (18.0 * self.fluid_density * self.kinematic_viscosity)
     }
     /// d |u − v|/ν at the mean slip and the largest.
     pub fn reynolds(&self) -> [f64; 2] {
@@ -144,10 +145,15 @@ impl fmt::Display for Scene {
         let number = |x: Option<f64>| x.map_or("not known".to_string(), |x| format!("{x:.3e}"));
         let mut row = |what: &str, value: String| writeln!(f, "  {what:44} {value}");
         row("from", self.from.clone())?;
-        row("particles", if self.particles.is_empty() { "not known".into() } else {
-            let (a, b) = (self.particles.min, self.particles.max);
-            if a == b { format!("{a}") } else { format!("{a} to {b}") }
-        })?;
+        row(
+            "particles",
+            if self.particles.is_empty() {
+                "not known".into()
+            } else {
+                let (a, b) = (self.particles.min, self.particles.max);
+                if a == b { format!("{a}") } else { format!("{a} to {b}") }
+            },
+        )?;
         row("cells", self.cells.map_or("not known".into(), |n| n.to_string()))?;
         if let Some([l, u]) = self.bounds {
             let short = |v: [f64; 3]| v.map(|x| (x * 1e9).round() / 1e9);

@@ -212,7 +212,9 @@ fn one<R: Read + Seek>(
                 let rate = |a: usize| (u[a] - u0[a] - (p.velocity[i][a] - v0[a])) / s.period;
                 [0, 1, 2].map(|a| rate(a) + along[a])
             }
-            None => [0, 1, 2].map(|a| along[a] - (k * slip[a] + drive.force[i][a]) / mass - f.fluid.gravity[a]),
+            None => {
+                [0, 1, 2].map(|a| along[a] - (k * slip[a] + drive.force[i][a]) / mass - f.fluid.gravity[a])
+            }
         };
         x.added.add(0.5 * rho * v * norm(relative));
         // the mean acceleration lasts as long as the slip relaxes, what differs from particle to particle one step

@@ -42,8 +42,7 @@ pub fn export<R: Read + Seek>(
         }
         let p = x.particles()?;
         let (fluid, sources, drive) = (x.fluid(&m.mesh)?, x.sources(&m.mesh)?, x.drive(&p)?);
-        let all =
-            Fields { mesh: &m.mesh, sources: &sources, fluid: &fluid, particles: &p, drive: &drive };
+        let all = Fields { mesh: &m.mesh, sources: &sources, fluid: &fluid, particles: &p, drive: &drive };
         let id = all.ids();
         match format {
             Format::Vtk => {

@@ -217,7 +217,12 @@ impl Sets {
             cfd_ranks: f.run.cfd_ranks,
             ..State::default()
         };
-        (f.output.restarts > 0).then(|| Self { case: c.folder.clone(), keep: f.output.restarts, head, real: true })
+        (f.output.restarts > 0).then(|| Self {
+            case: c.folder.clone(),
+            keep: f.output.restarts,
+            head,
+            real: true,
+        })
     }
 
     /// Names sets as the run did, and writes none: for a replay.

@@ -4,7 +4,7 @@
 
 use super::moment::Moments;
 use super::replay::{Options, Outcome, ReplayError, case, replay};
-use super::{RecordError, Reader};
+use super::{Reader, RecordError};
 use crate::inspect::{decide, recorded};
 use std::io::Cursor;
 

@@ -39,7 +39,9 @@ pub fn of(c: &Config, particles: u64, cells: u64) -> Forecast {
     let particle = 8 * (1 + 1 + 3 + 3 + 1 + 1 + 3 + 3 + 3 + 10 * on("send.history") + 1 + 3 + 3 + 3);
     // U and what is sent beside; ε, ε old, Sp, Su, ε_s U_s back
     let cell = 8
-        * (3 + 3 * on("send.pressure_gradient") + 3 * on("send.stress_divergence") + 6
+        * (3 + 3 * on("send.pressure_gradient")
+            + 3 * on("send.stress_divergence")
+            + 6
             + 3 * on("fluid.continuity"));
     let (exchanges, states) = count(&Selection::of(c));
     let exchange = particles * particle + cells * cell + 1000;

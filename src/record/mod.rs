@@ -41,7 +41,9 @@ pub enum RecordError {
         source: std::io::Error,
     },
     /// Something else.
-    #[error("not a recording of voidage ({0}); recordings are written by `voidage run CASE --set record.every=1`")]
+    #[error(
+        "not a recording of voidage ({0}); recordings are written by `voidage run CASE --set record.every=1`"
+    )]
     NotARecording(String),
     /// Numbers in another byte order.
     #[error(
@@ -49,13 +51,18 @@ pub enum RecordError {
     )]
     ByteOrder,
     /// A layout of the future.
-    #[error("recording format {theirs}, this program reads format {FORMAT}: use the version of voidage that wrote it")]
+    #[error(
+        "recording format {theirs}, this program reads format {FORMAT}: use the version of voidage that wrote it"
+    )]
     Version {
         /// of the file
         theirs: u32,
     },
     /// Messages of another protocol.
-    #[error("its messages have protocol version {theirs}, this program speaks {}: use the version of voidage that wrote it ({program})", voidage_wire::PROTOCOL)]
+    #[error(
+        "its messages have protocol version {theirs}, this program speaks {}: use the version of voidage that wrote it ({program})",
+        voidage_wire::PROTOCOL
+    )]
     Protocol {
         /// of the file
         theirs: u32,

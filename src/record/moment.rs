@@ -127,20 +127,11 @@ impl Messages {
 }
 
 /// Arrays of SOURCES and their width.
-pub const SOURCES: [(u32, usize); 5] = [
-    (field::VOIDAGE, 1),
-    (field::VOIDAGE_OLD, 1),
-    (field::SP, 1),
-    (field::SU, 3),
-    (field::SOLIDS_FLUX, 3),
-];
+pub const SOURCES: [(u32, usize); 5] =
+    [(field::VOIDAGE, 1), (field::VOIDAGE_OLD, 1), (field::SP, 1), (field::SU, 3), (field::SOLIDS_FLUX, 3)];
 /// Arrays of DRIVE and their width.
-pub const DRIVE: [(u32, usize); 4] = [
-    (field::DRAG_COEFFICIENT, 1),
-    (field::DRIVE_VELOCITY, 3),
-    (field::FORCE, 3),
-    (field::CHARGED, 3),
-];
+pub const DRIVE: [(u32, usize); 4] =
+    [(field::DRAG_COEFFICIENT, 1), (field::DRIVE_VELOCITY, 3), (field::FORCE, 3), (field::CHARGED, 3)];
 
 fn vectors(flat: Vec<f64>) -> Vec<[f64; 3]> {
     flat.chunks_exact(3).map(|v| [v[0], v[1], v[2]]).collect()

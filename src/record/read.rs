@@ -191,7 +191,11 @@ impl<R: Read + Seek> Reader<R> {
         let good = chunk::sum(&[&stored]) == header.sum
             && list.iter().all(|e| e.1 < at)
             && list.is_sorted_by(|a, b| a.0 < b.0);
-        if good { Ok(Some(list)) } else { Err(RecordError::Damaged { offset, what: "the index is wrong".into() }) }
+        if good {
+            Ok(Some(list))
+        } else {
+            Err(RecordError::Damaged { offset, what: "the index is wrong".into() })
+        }
     }
 
     fn scan(&mut self, from: u64) -> Result<(Vec<(i64, u64)>, End), RecordError> {

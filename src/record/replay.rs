@@ -229,7 +229,10 @@ const FIXED: &[&str] = &[
 ];
 
 /// The case of a recording with overrides, checked.
-pub fn case<R: Read + Seek>(reader: &Reader<R>, overrides: &[(String, String)]) -> Result<Config, ReplayError> {
+pub fn case<R: Read + Seek>(
+    reader: &Reader<R>,
+    overrides: &[(String, String)],
+) -> Result<Config, ReplayError> {
     let s = &reader.session;
     let fixed = |key: &str| FIXED.iter().any(|f| key == *f || f.ends_with('.') && key.starts_with(f));
     let wrong: Vec<Problem> = overrides
@@ -286,7 +289,16 @@ pub fn replay<R: Read + Seek + 'static>(
     let queues = (0..dem + cfd).map(|_| VecDeque::new()).collect();
     let empty = || Messages::new(i64::MIN, 0.0);
     let (recorded, anew) = (empty(), empty());
-    let player = Player { reader, queues, begin: None, recorded, anew, told: BTreeMap::new(), ended: false, error: None };
+    let player = Player {
+        reader,
+        queues,
+        begin: None,
+        recorded,
+        anew,
+        told: BTreeMap::new(),
+        ended: false,
+        error: None,
+    };
     let player = Rc::new(RefCell::new(player));
     let recorder = match options.save {
         None => None,

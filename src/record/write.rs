@@ -104,7 +104,15 @@ impl Recorder {
         let (back, spare) = sync_channel(QUEUE);
         let target = path.to_path_buf();
         let thread = std::thread::spawn(move || writer(file, target, how, &todo, &back));
-        let inner = Inner { selection, last: None, jobs: Some(jobs), spare, thread: Some(thread), path: path.into(), spent: Duration::ZERO };
+        let inner = Inner {
+            selection,
+            last: None,
+            jobs: Some(jobs),
+            spare,
+            thread: Some(thread),
+            path: path.into(),
+            spent: Duration::ZERO,
+        };
         let this = Self(Rc::new(RefCell::new(inner)));
         let mut words = vec![0u64; text.len().div_ceil(8)];
         bytemuck::cast_slice_mut::<u64, u8>(&mut words)[..text.len()].copy_from_slice(text.as_bytes());
@@ -207,10 +215,11 @@ fn writer(
     for job in jobs {
         // a message may come before the begin of its exchange is told
         match job.head {
-            Head::Message { step, kind, .. } if [kind::PARTICLES, kind::FIELDS].contains(&kind) => {
-                if begins.last().is_none_or(|b: &(i64, u64)| b.0 < step) {
-                    begins.push((step, at));
-                }
+            Head::Message { step, kind, .. }
+                if [kind::PARTICLES, kind::FIELDS].contains(&kind)
+                    && begins.last().is_none_or(|b: &(i64, u64)| b.0 < step) =>
+            {
+                begins.push((step, at));
             }
             Head::Exchange { k, .. } => match begins.last() {
                 Some(b) if b.0 == k => places.push(*b),

@@ -73,7 +73,8 @@ fn dem(mut t: Memory, rank: u32, size: u32, mut list: Vec<P>) {
             return;
         }
         let n = list.len();
-        let (c, u) = (f.f64s(field::DRAG_COEFFICIENT).unwrap(), f.vectors_of(field::DRIVE_VELOCITY, n).unwrap());
+        let (c, u) =
+            (f.f64s(field::DRAG_COEFFICIENT).unwrap(), f.vectors_of(field::DRIVE_VELOCITY, n).unwrap());
         let (g, q) = (f.vectors_of(field::FORCE, n).unwrap(), f.vectors_of(field::CHARGED, n).unwrap());
         totals = [0.0; 9];
         for (i, p) in list.iter_mut().enumerate() {
@@ -202,7 +203,9 @@ pub fn record_in(
     for piece in pieces {
         let (partner, end) = memory::pair("CFD", "coupler");
         ends.push(end);
-        threads.push(std::thread::spawn(move || cfd(partner, piece.rank as u32, cfd_ranks as u32, piece, steps)));
+        threads.push(std::thread::spawn(move || {
+            cfd(partner, piece.rank as u32, cfd_ranks as u32, piece, steps)
+        }));
     }
     let selection = Selection { steps: steps as u64, ..Selection::of(c) };
     let session = SessionHead {
