@@ -323,7 +323,8 @@ pub fn bench(json: Option<&Path>, quick: bool) -> u8 {
 
 /// `voidage version`
 pub fn version() -> u8 {
-    println!("voidage {}, wire protocol {PROTOCOL}", env!("CARGO_PKG_VERSION"));
+    let recording = crate::record::FORMAT;
+    println!("voidage {}, wire protocol {PROTOCOL}, recording format {recording}", env!("CARGO_PKG_VERSION"));
     for package in ["openfoam", "liggghts", "lammps"] {
         let out = std::process::Command::new("dpkg-query").args(["-W", "-f", "${Version}", package]).output();
         let found =

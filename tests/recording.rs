@@ -372,3 +372,48 @@ fn the_forecast_bounds_the_size() {
         assert!(size <= f.total as f64 && size > 0.7 * f.total as f64, "{size} {f:?}");
     }
 }
+
+#[test]
+fn commands_say_what_is_wrong_with_a_file() {
+    let good = Scratch::new("commands");
+    record(&good.0, &case(&[("record.first", "2")], 3), 3, [1, 1], Compression::Lz4);
+    let bad = Scratch::new("commands-bad");
+    let mut bytes = good.bytes();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&bad.0, bytes).unwrap();
+    let file = good.0.display().to_string();
+    let damaged = bad.0.display().to_string();
+    let folder = std::env::temp_dir().display().to_string();
+    let readme = concat!(env!("CARGO_MANIFEST_DIR"), "/README.md");
+    let table: &[(&[&str], i32, &str)] = &[
+        (&["replay", &file], 0, "all replies are bit-identical with the recorded ones"),
+        (&["replay", &file, "--set", "forces.drag=wen-yu"], 0, "the replies differ from the recorded ones"),
+        (&["replay", &file, "--compare", &file], 0, "all replies are bit-identical with those of"),
+        (&["replay", &damaged], 2, "damaged at byte"),
+        (&["inspect", &damaged], 2, "damaged at byte"),
+        (&["replay", "/nowhere"], 2, "/nowhere: No such file"),
+        (&["replay", &folder], 2, "is a folder"),
+        (&["inspect", readme], 2, "not a recording of voidage (it begins with \"# voidag\")"),
+        (&["replay", &file, "--set", "dem.script=x"], 2, "a replay cannot change it"),
+        (&["replay", &file, "--set", "forces.drag"], 2, "overrides are section.key=value"),
+        (&["replay", &file, "--save", &file], 2, "exists"),
+        (&["inspect", &file, "--accuracy", "2"], 2, "between 0 and 1"),
+        (&["export", &file, "--format", "hdf"], 2, "accepted: vtk, csv"),
+        (&["export", &file, "--every", "0"], 2, "at least 1"),
+        (
+            &["export", &file, "--into", concat!(env!("CARGO_MANIFEST_DIR"), "/src")],
+            2,
+            "the folder is not empty",
+        ),
+    ];
+    for (arguments, code, words) in table {
+        let o = std::process::Command::new(env!("CARGO_BIN_EXE_voidage")).args(*arguments).output().unwrap();
+        let text = format!("{}{}", String::from_utf8_lossy(&o.stdout), String::from_utf8_lossy(&o.stderr));
+        assert!(
+            o.status.code() == Some(*code) && text.contains(words),
+            "{arguments:?}: {:?} {text}",
+            o.status
+        );
+    }
+}

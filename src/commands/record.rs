@@ -39,7 +39,12 @@ pub(super) fn before(c: &Config, from: Option<f64>) -> Result<(), Problem> {
         let fix = "remove it, or record.file = \"another.voidage\"";
         return Err(Problem::error("record.file", file.display(), "a recording is never overwritten", fix));
     }
-    let free = rustix::fs::statvfs(&c.folder).map(|s| s.f_bavail.saturating_mul(s.f_frsize));
+    let folder = file.parent().unwrap_or(&c.folder);
+    if !folder.is_dir() {
+        let accepted = format!("the folder {} does not exist", folder.display());
+        return Err(Problem::error("record.file", file.display(), &accepted, "make the folder first"));
+    }
+    let free = rustix::fs::statvfs(folder).map(|s| s.f_bavail.saturating_mul(s.f_frsize));
     if let (Ok(f), Ok(free)) = (sizes::forecast(c), free)
         && f.total > free
     {
