@@ -358,11 +358,23 @@ impl CouplingStep {
         Self { pinned, ..self }
     }
 
-    /// Puts the voidage and the fluid velocity at the start of the coming step (restart).
-    pub fn restore(&mut self, voidage: &[f64], fluid_velocity: &[[f64; 3]]) {
+    /// What the step carries from one exchange to the next: voidage, fluid velocity (m/s), and that of one step earlier
+    /// (empty where nothing needs it).
+    pub fn carried(&self) -> (&[f64], &[[f64; 3]], &[[f64; 3]]) {
+        (&self.sources.voidage, &self.fluid_velocity, &self.fluid_before)
+    }
+
+    /// Puts what the step carries into the coming exchange (restart, recording): see `carried`.
+    pub fn restore(&mut self, voidage: &[f64], fluid_velocity: &[[f64; 3]], before: &[[f64; 3]]) {
         self.sources.voidage.copy_from_slice(voidage);
         self.fluid_velocity.copy_from_slice(fluid_velocity);
+        self.fluid_before = before.to_vec();
         self.filled = (0..self.mesh.len() as u32).collect();
+    }
+
+    /// The smoother of this run.
+    pub fn smoother(&self) -> &dyn Smoother {
+        &*self.smoother
     }
 
     /// Where the particles of this exchange lie; those of the next one are best stored alike.

@@ -275,7 +275,7 @@ mod tests {
                 scale: p.scale,
             });
             let whole = Active::whole(mesh.len());
-            let mut of = |s: &mut Polynomial| {
+            let of = |s: &mut Polynomial| {
                 let mut out = field.clone();
                 s.apply(&mut out, &whole, Direction::Spread, &mut Scratch::default());
                 out
