@@ -306,6 +306,7 @@ fn setup(scheme: &str, fluid_velocity: FluidVelocity, model_b: bool) -> Setup {
         voidage_min: 0.0,
         exclude_outside: false,
         extra: forces::Extra::default(),
+        average: None,
     }
 }
 
@@ -345,7 +346,7 @@ fn exchange(
     });
     step.books.reaction = reaction;
     let error = step.books.error(None);
-    let Drive { drag_coefficient, velocity, force, charged } = &step.drive;
+    let Drive { drag_coefficient, velocity, force, charged, .. } = &step.drive;
     let bits = |i: usize| {
         let all = [[drag_coefficient[i]].as_slice(), &velocity[i], &force[i], &charged[i]].concat();
         (p.id[i], std::array::from_fn(|k| all[k].to_bits()))
@@ -390,7 +391,8 @@ fn action_is_reaction_with_lift_added_mass_parcels_and_their_stress() {
                 floor: 1e-7,
             });
             let plain = with(forces::Extra::default());
-            let all = with(forces::Extra { ratio: 2.0, lift, added_mass: 0.5, stress });
+            let all =
+                with(forces::Extra { ratio: 2.0, lift, added_mass: 0.5, stress, ..forces::Extra::default() });
             assert!(plain.2 < 1e-12 && all.2 < 1e-12, "{:e} {:e}", plain.2, all.2);
             assert!(plain.1 != all.1 && plain.0.sp != all.0.sp && plain.0.voidage == all.0.voidage);
             let one = with(forces::Extra { stress, ..forces::Extra::default() });
@@ -497,6 +499,37 @@ fn the_ledger_of_an_excluded_particle_waits() {
     assert_eq!(step.drive.charged[0].map(|c| -c), ledger);
     assert!(step.sources.su.iter().flatten().all(|x| *x == 0.0));
     assert_eq!(step.books.error(None), 0.0);
+}
+
+#[test]
+fn what_has_no_reaction_never_reaches_the_fluid_not_even_in_the_first_interval() {
+    let mesh = assemble(&meshes()[0].whole()).unwrap();
+    let none = || -> Box<dyn Smoother> { Box::new(Unsmoothed) };
+    for name in ["conservative", "explicit"] {
+        let s =
+            Setup { mean_pressure_gradient: [0.0, 7.0, -20.0], ..setup(name, FluidVelocity::Gather, false) };
+        let period = s.period;
+        let mut step = CouplingStep::new(mesh.clone(), s, Box::new(ParticleCentroid), none(), none());
+        let at_rest = |ledger| P { id: 1, x: [0.031, 0.022, 0.012], v: [0.0; 3], r: 1e-3, ledger };
+        let still = Fluid { velocity: vec![[0.0; 3]; mesh.len()], ..Fluid::default() };
+        let mut exchange = |p: P, first: bool| {
+            let words = message(&[p]);
+            let mut p = Particles::receive(&[Frame::parse(&words).unwrap()], &Places::default()).unwrap();
+            step.before_fluid(&mut p, first).unwrap();
+            step.after_fluid(&p, &still, first).unwrap();
+            (step.drive.force[0], step.drive.charged[0], step.sources.su.clone(), step.books)
+        };
+        // a held particle in fluid at rest takes Archimedes' force and that of the mean pressure gradient, no more
+        let (force, charged, _, books) = exchange(at_rest([0.0; 3]), true);
+        let v = 4.0 / 3.0 * std::f64::consts::PI * 1e-9;
+        assert!((force[2] / (v * (1.2 * 9.81 + 20.0)) - 1.0).abs() < 1e-12, "{force:?}");
+        let taken = force.map(|f| f * period);
+        assert_eq!(books.error(Some(charged)), 0.0);
+        // the fix: L = taken - charged
+        let ledger = [0, 1, 2].map(|a| taken[a] - charged[a]);
+        let (_, _, su, _) = exchange(at_rest(ledger), false);
+        assert!(su.iter().flatten().all(|x| *x == 0.0), "{name}: {ledger:?} was given to the fluid");
+    }
 }
 
 #[test]

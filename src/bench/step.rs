@@ -88,6 +88,7 @@ pub fn setup(drag: &str) -> Result<Setup, String> {
         period: 2e-4,
         voidage_min: 0.0,
         exclude_outside: false,
+        average: None,
         extra: Extra::default(),
     })
 }

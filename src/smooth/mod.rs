@@ -12,6 +12,7 @@
 
 mod active;
 mod average;
+mod classes;
 pub mod coefficients;
 mod diffusion;
 mod direct;
@@ -19,19 +20,23 @@ pub mod factors;
 mod field;
 mod graph;
 mod pcg;
+mod pinned;
 mod polynomial;
 mod product;
 mod real;
 mod recurrence;
 mod sweep;
+pub mod wake;
 
 pub use active::Active;
 pub use average::TimeAverage;
+pub use classes::Classes;
 pub use diffusion::Diffusion;
 pub use direct::Direct;
 pub use field::{Field, Scratch};
 pub use graph::Graph;
 pub use pcg::Implicit;
+pub use pinned::Pinned;
 pub use polynomial::{Polynomial, Single};
 
 use crate::mesh::Mesh;
