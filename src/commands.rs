@@ -14,7 +14,6 @@ use crate::output::restart::{Sets, State};
 use crate::partners::Partners;
 use crate::record::{Recorded, Recorder};
 use crate::setup;
-use crate::step::CouplingStep;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -64,8 +63,9 @@ pub fn check(case: &Path, set: &[String]) -> u8 {
     let problems = config::check(&config);
     print(&problems);
     record::forecast(&config);
-    let errors = problems.iter().filter(|p| p.severity == Severity::Error).count();
-    println!("{}: {errors} errors, {} warnings", case.display(), problems.len() - errors);
+    let count = |s: Severity| problems.iter().filter(|p| p.severity == s).count();
+    let errors = count(Severity::Error);
+    println!("{}: {errors} errors, {} warnings", case.display(), count(Severity::Warning));
     if errors == 0 { OK } else { BAD_INPUT }
 }
 
@@ -91,7 +91,9 @@ pub fn run(case: &Path, into: Option<&Path>, set: &[String], restart: Option<Opt
     if let Some(r) = &restart {
         config.control.start = r.state.origin;
     }
-    let problems = config::check(&config);
+    let mut problems = config::check(&config);
+    // numbers to judge by are for `check`
+    problems.retain(|p| p.severity != Severity::Note);
     print(&problems);
     if problems.iter().any(|p| p.severity == Severity::Error) {
         return BAD_INPUT;
@@ -209,10 +211,8 @@ fn exchange(
     }
     let mesh = receive_mesh(partners).map_err(|e| e.to_string())?;
     println!("mesh: {} cells of {} ranks", mesh.len(), session.cfd_ranks);
-    let [smoother, positive] = setup::smoothers(config, &mesh)?;
-    println!("smoothing: {}, {} sweeps", smoother.name(), smoother.degree());
-    let mapping = setup::mapping(config, &mesh)?;
-    let step = CouplingStep::new(mesh, setup::setup(config)?, mapping, smoother, positive);
+    let step = setup::step(config, mesh)?;
+    println!("smoothing: {}, {} sweeps", step.smoother().name(), step.smoother().degree());
     let file = config.folder.join("monitor.csv");
     let monitor = match &resume {
         None => Monitor::create(&file, false),
@@ -301,7 +301,7 @@ pub fn explain(topic: &str) -> u8 {
 }
 
 /// `voidage bench`
-pub fn bench(json: Option<&Path>, quick: bool) -> u8 {
+pub fn bench(json: Option<&Path>, plot: Option<&Path>, quick: bool) -> u8 {
     let report = match crate::bench::report::run(quick, |what| eprintln!("{what}")) {
         Ok(r) => r,
         Err(e) => {
@@ -310,15 +310,20 @@ pub fn bench(json: Option<&Path>, quick: bool) -> u8 {
         }
     };
     println!("{}", report.table());
-    let Some(file) = json else { return OK };
-    let text = serde_json::to_string_pretty(&report).map_err(|e| e.to_string());
-    match text.and_then(|t| std::fs::write(file, t + "\n").map_err(|e| e.to_string())) {
-        Ok(()) => OK,
+    let write = |option: &str, file: &Path, text: String| {
+        let done = std::fs::write(file, text);
+        done.map_err(|e| eprintln!("error: {option} {}: {e}", file.display())).is_ok()
+    };
+    let text = match serde_json::to_string_pretty(&report) {
+        Ok(t) => t + "\n",
         Err(e) => {
-            eprintln!("error: --json {}: {e}", file.display());
-            FAILED
+            eprintln!("error: --json: {e}");
+            return FAILED;
         }
-    }
+    };
+    let written = json.is_none_or(|file| write("--json", file, text))
+        & plot.is_none_or(|file| write("--plot", file, report.plot()));
+    if written { OK } else { FAILED }
 }
 
 /// `voidage version`

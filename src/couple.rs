@@ -6,6 +6,7 @@
 //! (generic over `Transport`), nor how a stage works.
 
 use crate::balance::Books;
+use crate::forces::history::Memory;
 use crate::mesh::{self, Mesh, MeshPiece};
 use crate::monitor::{Monitor, Row};
 use crate::output::restart::{self, Sets, State};
@@ -447,23 +448,33 @@ impl<T: Transport> Exchange<'_, T> {
         let mut counts = vec![0; self.partners.dem().len()];
         particles.origin.iter().for_each(|o| counts[o.0 as usize] += 1);
         let drive = &self.step.drive;
+        let memory: Vec<f64> = drive.memory.iter().flat_map(|m| m.0).collect();
         for i in self.partners.dem() {
             let n = counts[i];
-            let vectors = [
-                (field::DRIVE_VELOCITY, &drive.velocity),
-                (field::FORCE, &drive.force),
-                (field::CHARGED, &drive.charged),
+            let arrays = [
+                (field::DRAG_COEFFICIENT, 1, &drive.drag_coefficient[..]),
+                (field::DRIVE_VELOCITY, 3, drive.velocity.as_flattened()),
+                (field::FORCE, 3, drive.force.as_flattened()),
+                (field::CHARGED, 3, drive.charged.as_flattened()),
+                (field::ADDED_MASS, 1, &drive.added_mass[..]),
+                (field::ROTATION_COEFFICIENT, 1, &drive.rotation_coefficient[..]),
+                (field::ROTATION_RATE, 3, drive.rotation_rate.as_flattened()),
+                (field::MEMORY, Memory::WIDTH, &memory[..]),
             ];
-            let mut blocks = vec![Block::f64s(field::DRAG_COEFFICIENT, n)];
-            blocks.extend(vectors.iter().map(|f| Block::f64s(f.0, 3 * n)));
+            // those behind the first four only if they are asked for, from no particles too
+            let asked = |name: u32| match name {
+                field::ADDED_MASS => self.step.extra().felderhof,
+                field::ROTATION_COEFFICIENT | field::ROTATION_RATE => self.step.extra().torque,
+                field::MEMORY => self.step.extra().history,
+                _ => true,
+            };
+            let mut blocks: Vec<_> =
+                arrays.iter().filter(|f| asked(f.0)).map(|f| Block::f64s(f.0, f.1 * n)).collect();
             if let Some(name) = &file {
                 blocks.extend([Block::bytes(field::RESTART_FILE, name.len()), Block::f64s(field::FLAGS, 1)]);
             }
             let own = || particles.origin.iter().enumerate().filter(|(_, o)| o.0 as usize == i);
             self.partners.send(i, kind::DRIVE, k, time, &blocks, |words| {
-                if let Some(to) = frame::f64s_mut(words, field::DRAG_COEFFICIENT) {
-                    own().for_each(|(p, o)| to[o.1 as usize] = drive.drag_coefficient[p]);
-                }
                 if let (Some(name), Some(to)) = (&file, frame::array_mut(words, field::RESTART_FILE)) {
                     for (word, bytes) in to.iter_mut().zip(name.as_bytes().chunks(8)) {
                         let mut all = [0; 8];
@@ -474,9 +485,11 @@ impl<T: Transport> Exchange<'_, T> {
                 if let Some(to) = frame::f64s_mut(words, field::FLAGS) {
                     to[0] = f64::from(u8::from(last));
                 }
-                for (name, from) in vectors {
+                for (name, width, from) in arrays {
                     let Some(to) = frame::f64s_mut(words, name) else { continue };
-                    own().for_each(|(p, o)| to[3 * o.1 as usize..][..3].copy_from_slice(&from[p]));
+                    own().for_each(|(p, o)| {
+                        to[width * o.1 as usize..][..width].copy_from_slice(&from[width * p..][..width]);
+                    });
                 }
             })?;
         }

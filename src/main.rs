@@ -103,6 +103,9 @@ enum Command {
         /// also write all numbers to this file (fields: src/bench/report.rs)
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
+        /// also draw the smoothers' time over their error (SVG)
+        #[arg(long, value_name = "FILE")]
+        plot: Option<PathBuf>,
         /// a tenth of the size, for a first look
         #[arg(long)]
         quick: bool,
@@ -131,7 +134,7 @@ fn main() -> ExitCode {
             commands::export::export(&file, into.as_deref(), &format, every)
         }
         Command::Explain { topic } => commands::explain(&topic),
-        Command::Bench { json, quick } => commands::bench(json.as_deref(), quick),
+        Command::Bench { json, plot, quick } => commands::bench(json.as_deref(), plot.as_deref(), quick),
         Command::Version => commands::version(),
     };
     ExitCode::from(code)

@@ -6,6 +6,7 @@
 //! the mesh.
 
 use crate::arrange::Places;
+use crate::forces::history::Memory;
 use crate::mesh::NONE;
 use crate::scheme::History;
 use crate::{sums, threads};
@@ -32,8 +33,21 @@ pub struct Particles {
     pub ledger: Vec<[f64; 3]>,
     /// last interval, if the scheme wants it
     pub history: History,
+    /// what only some cases ask for
+    pub asked: Asked,
     /// N s, sums over all particles, those that vanished since included
     pub totals: Totals,
+}
+
+/// What the DEM sends when a force asks for it; empty if not.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Asked {
+    /// type
+    pub kind: Vec<i64>,
+    /// angular velocity, rad/s
+    pub spin: Vec<[f64; 3]>,
+    /// what a force left with the particle in the last exchange
+    pub memory: Vec<Memory>,
 }
 
 /// Sums the DEM reports for the last interval, N s.
@@ -126,8 +140,27 @@ impl Particles {
                 velocity: vectors(field::LAST_VELOCITY)?,
             };
         }
+        let mut asked = Asked::default();
+        let sent = |name: u32| !frames.is_empty() && frames.iter().all(|f| f.raw(name).is_some());
+        if sent(field::TYPE) {
+            let parts = frames.iter().map(|f| f.i64s(field::TYPE)).collect::<Result<Vec<_>, _>>()?;
+            let of = |o: &(i64, u32, u32)| parts[o.1 as usize].get(o.2 as usize).copied().unwrap_or_default();
+            asked.kind = order.iter().map(of).collect();
+        }
+        if sent(field::ANGULAR_VELOCITY) {
+            asked.spin = vectors(field::ANGULAR_VELOCITY)?;
+        }
+        if sent(field::LAST_MEMORY) {
+            let part = |(f, i): (&Frame, &&[i64])| -> Result<Vec<Memory>, WireError> {
+                let flat = f.f64s_of(field::LAST_MEMORY, Memory::WIDTH * i.len())?;
+                Ok(flat.as_chunks().0.iter().map(|m| Memory(*m)).collect())
+            };
+            let parts = frames.iter().zip(&ids).map(part).collect::<Result<Vec<_>, _>>()?;
+            asked.memory = order.iter().map(|o| parts[o.1 as usize][o.2 as usize]).collect();
+        }
         let p = Self {
             history,
+            asked,
             position: vectors(field::POSITION)?,
             velocity: vectors(field::VELOCITY)?,
             radius: scalars(field::RADIUS)?,
@@ -146,6 +179,9 @@ impl Particles {
         let h = &mut self.history;
         permute(&mut self.id, list, &mut spare.ids);
         permute(&mut self.origin, list, &mut spare.origins);
+        permute(&mut self.asked.kind, list, &mut spare.ids);
+        permute(&mut self.asked.spin, list, &mut spare.vectors);
+        permute(&mut self.asked.memory, list, &mut Vec::new());
         for array in [&mut self.radius, &mut self.mass, &mut h.drag_coefficient] {
             permute(array, list, &mut spare.numbers);
         }
@@ -167,7 +203,8 @@ impl Particles {
         let positive = |v: &[f64]| v.iter().fold(true, |all, x| all & (*x > 0.0));
         let good = vectors.iter().all(|v| sums::finite(v.as_flattened()))
             && [&self.radius, &self.mass].iter().all(|v| sums::finite(v) && positive(v));
-        if good && self.history.drag_coefficient.is_empty() {
+        let asked = !self.asked.spin.is_empty() || !self.asked.memory.is_empty();
+        if good && self.history.drag_coefficient.is_empty() && !asked {
             return Ok(());
         }
         let finite = |v: &[f64; 3]| v.iter().all(|x| x.is_finite());
@@ -176,6 +213,12 @@ impl Particles {
                 () if !finite(&self.position[i]) => format!("position {:?}", self.position[i]),
                 () if !finite(&self.velocity[i]) => format!("velocity {:?}", self.velocity[i]),
                 () if !finite(&self.ledger[i]) => format!("ledger {:?}", self.ledger[i]),
+                () if self.asked.spin.get(i).is_some_and(|w| !finite(w)) => {
+                    format!("angular velocity {:?}", self.asked.spin[i])
+                }
+                () if self.asked.memory.get(i).is_some_and(|m| !m.0.iter().all(|x| x.is_finite())) => {
+                    "what it remembers of its past is not a finite number".into()
+                }
                 () if self.history.wrong(i) => "its last interval is not a finite number".into(),
                 () if !(self.radius[i] > 0.0 && self.radius[i].is_finite()) => {
                     format!("radius {}", self.radius[i])

@@ -306,6 +306,7 @@ fn setup(scheme: &str, fluid_velocity: FluidVelocity, model_b: bool) -> Setup {
         voidage_min: 0.0,
         exclude_outside: false,
         extra: forces::Extra::default(),
+        average: None,
     }
 }
 
@@ -345,7 +346,7 @@ fn exchange(
     });
     step.books.reaction = reaction;
     let error = step.books.error(None);
-    let Drive { drag_coefficient, velocity, force, charged } = &step.drive;
+    let Drive { drag_coefficient, velocity, force, charged, .. } = &step.drive;
     let bits = |i: usize| {
         let all = [[drag_coefficient[i]].as_slice(), &velocity[i], &force[i], &charged[i]].concat();
         (p.id[i], std::array::from_fn(|k| all[k].to_bits()))
@@ -390,7 +391,8 @@ fn action_is_reaction_with_lift_added_mass_parcels_and_their_stress() {
                 floor: 1e-7,
             });
             let plain = with(forces::Extra::default());
-            let all = with(forces::Extra { ratio: 2.0, lift, added_mass: 0.5, stress });
+            let all =
+                with(forces::Extra { ratio: 2.0, lift, added_mass: 0.5, stress, ..forces::Extra::default() });
             assert!(plain.2 < 1e-12 && all.2 < 1e-12, "{:e} {:e}", plain.2, all.2);
             assert!(plain.1 != all.1 && plain.0.sp != all.0.sp && plain.0.voidage == all.0.voidage);
             let one = with(forces::Extra { stress, ..forces::Extra::default() });

@@ -95,6 +95,7 @@ fn setup(scheme: &'static dyn scheme::Scheme, how: FluidVelocity, model_b: bool)
         voidage_min: 0.0,
         exclude_outside: false,
         extra: forces::Extra::default(),
+        average: None,
     }
 }
 

@@ -55,10 +55,22 @@ pub fn read(path: &Path, given: &BTreeMap<String, String>) -> Result<Script, Str
                 let file = w.get(1).map(|f| path.parent().unwrap_or(Path::new(".")).join(f));
                 s.domain = file.as_ref().and_then(|f| data_box(f));
                 s.count = file.as_ref().and_then(|f| data_count(f));
+                if let Some((radius, density)) = file.as_ref().and_then(|f| data_spheres(f)) {
+                    (s.radius, s.density) = (s.radius.or(Some(radius)), s.density.or(Some(density)));
+                }
                 s.data = file;
             }
             Some("read_restart") => s.has_restart = true,
             Some("fix") if w.get(3) == Some(&"voidage") => s.has_fix = true,
+            Some("fix") if w.get(3) == Some(&"particletemplate/sphere") => {
+                let constant = |key: &str| {
+                    let at = w.windows(2).position(|p| p == [key, "constant"])?;
+                    n(at + 2)
+                };
+                // of several, the largest
+                s.radius = constant("radius").into_iter().chain(s.radius).max_by(f64::total_cmp);
+                s.density = constant("density").or(s.density);
+            }
             Some("run" | "rerun") => s.has_run = true,
             Some("set") if line.contains("density") || line.contains("diameter") => {
                 let after = |key: &str| w.iter().position(|x| *x == key).and_then(|i| n(i + 1));
@@ -116,4 +128,17 @@ fn data_box(path: &Path) -> Option<([f64; 3], [f64; 3])> {
     };
     let (x, y, z) = (axis("x")?, axis("y")?, axis("z")?);
     Some(([x.0, y.0, z.0], [x.1, y.1, z.1]))
+}
+
+/// Sauter radius Σ r³/Σ r² (m) and mean density (kg/m3) of the atoms (style granular: id type diameter density x y z).
+fn data_spheres(path: &Path) -> Option<(f64, f64)> {
+    let text = std::fs::read_to_string(path).ok()?;
+    let section = text.lines().skip_while(|l| l.split_whitespace().next() != Some("Atoms")).skip(1);
+    let rows = section.map(|l| l.split_whitespace().map_while(|w| w.parse().ok()).collect::<Vec<f64>>());
+    let (mut cubes, mut squares, mut mass) = (0.0, 0.0, 0.0);
+    for row in rows.skip_while(Vec::is_empty).take_while(|r| r.len() >= 7) {
+        let d = row[2];
+        (cubes, squares, mass) = (cubes + d * d * d, squares + d * d, mass + d * d * d * row[3]);
+    }
+    (squares > 0.0 && cubes > 0.0).then(|| (0.5 * cubes / squares, mass / cubes))
 }

@@ -33,7 +33,7 @@ pub fn scene(c: &Config) -> Result<Scene, String> {
     let phi = s.count.zip(volume).map(|(n, v)| (n * sphere / v).min(0.9));
     let law = forces::by_name(&f.forces.drag).ok_or("forces.drag")?;
     let mean = phi.unwrap_or(0.0);
-    let ratio = f.dem.coarse_graining;
+    let ratio = f.dem.coarse_graining.of_all();
     let k = |speed: f64, voidage: f64| {
         let slip =
             forces::Slip { diameter: d / ratio, voidage, speed, kinematic_viscosity: nu, density: rho };
@@ -136,12 +136,20 @@ fn terms(s: &mut Scene, c: &Config, drag: f64, weight: f64, phi: Option<f64>, hi
         0.5 * rho * sphere * fastest / scale,
         to,
         "bound: rho_f/(2 rho_p)",
-        f.forces.added_mass > 0.0,
+        f.forces.added_mass.on(),
         Some("forces.added_mass = 0.5"),
         Some("forces.added_mass = 0"),
     );
     let basset = forces::history::coefficient(d, rho, nu) * 2.0 * tau.sqrt() * fastest / scale;
-    put("history (Basset)", basset, to, "bound: acceleration lasting m/K", false, None, None);
+    put(
+        "history (Basset)",
+        basset,
+        to,
+        "bound: acceleration lasting m/K",
+        f.forces.history,
+        Some("forces.history = true"),
+        Some("forces.history = false"),
+    );
     let flow = forces::lift::Shear {
         diameter: d,
         slip: [slip, 0.0, 0.0],

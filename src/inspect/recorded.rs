@@ -153,7 +153,12 @@ fn one<R: Read + Seek>(
         hosts[lost.index] = NONE;
     }
     s.particles.add(p.len() as f64);
-    let (rho, nu, ratio) = (f.fluid.density, f.fluid.kinematic_viscosity, f.dem.coarse_graining);
+    let (rho, nu) = (f.fluid.density, f.fluid.kinematic_viscosity);
+    let (all, by_type) = (f.dem.coarse_graining.of_all(), f.dem.coarse_graining.by_type());
+    let ratio_of = |i: usize| {
+        let of_type = |k: &i64| by_type.get(usize::try_from(*k).ok()?).copied();
+        p.asked.kind.get(i).and_then(of_type).unwrap_or(all)
+    };
     let at = |field: &[V], j: usize| field.get(j).copied().unwrap_or_default();
     let stress = ParticleStress {
         pressure: if f.forces.particle_stress > 0.0 { f.forces.particle_stress } else { 10.0 },
@@ -161,7 +166,7 @@ fn one<R: Read + Seek>(
         close_packing: f.forces.close_packing,
         floor: 1e-7,
     };
-    let parcels = ratio > 1.0 || f.forces.particle_stress > 0.0;
+    let parcels = all > 1.0 || !by_type.is_empty() || f.forces.particle_stress > 0.0;
     let tau: Vec<V> = if parcels {
         q.voidage.iter().map(|e| [stress.stress(1.0 - e), 0.0, 0.0]).collect()
     } else {
@@ -170,6 +175,7 @@ fn one<R: Read + Seek>(
     let mut coefficient = vec![0.0; mesh.len()];
     for i in (0..p.len()).filter(|i| hosts[*i] != NONE) {
         let (j, v, mass, d) = (hosts[i] as usize, p.volume(i), p.mass[i], 2.0 * p.radius[i]);
+        let ratio = ratio_of(i);
         let primary = d / ratio;
         *solids += v;
         s.diameter.add(d);
@@ -294,13 +300,21 @@ fn terms(s: &mut Scene, x: &Forces, c: &Config) {
         x.added.value() / scale,
         to,
         acceleration,
-        f.forces.added_mass > 0.0,
+        f.forces.added_mass.on(),
         Some("forces.added_mass = 0.5"),
         Some("forces.added_mass = 0"),
     );
     let lasting = norm(x.lasting.0) / x.lasting.1.max(1.0);
     let history = x.history.value().hypot(lasting) / scale;
-    put("history (Basset)", history, to, "mean acceleration lasting m/K, rest one step", false, None, None);
+    put(
+        "history (Basset)",
+        history,
+        to,
+        "mean acceleration lasting m/K, rest one step",
+        f.forces.history,
+        Some("forces.history = true"),
+        Some("forces.history = false"),
+    );
     put(
         "lift",
         x.lift.value() / scale,

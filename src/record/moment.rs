@@ -122,7 +122,7 @@ impl Messages {
         let mut vector = |name| vectors(a.remove(&name).unwrap_or_default());
         let (velocity, force, charged) =
             (vector(field::DRIVE_VELOCITY), vector(field::FORCE), vector(field::CHARGED));
-        Ok(Drive { drag_coefficient, velocity, force, charged })
+        Ok(Drive { drag_coefficient, velocity, force, charged, ..Drive::default() })
     }
 }
 

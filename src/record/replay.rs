@@ -12,7 +12,7 @@ use crate::couple::{Course, Exchange, Summary, receive_mesh};
 use crate::output::restart::Sets;
 use crate::partners::Partners;
 use crate::setup;
-use crate::step::{CouplingStep, Seconds};
+use crate::step::Seconds;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{Read, Seek};
@@ -331,10 +331,7 @@ pub fn replay<R: Read + Seek + 'static>(
     }
     let mesh = receive_mesh(&mut partners).map_err(|e| told(&e))?;
     let (slots, cells) = (mesh.slots.clone(), mesh.len());
-    let [smoother, positive] = setup::smoothers(&config, &mesh).map_err(ReplayError::Run)?;
-    let mapping = setup::mapping(&config, &mesh).map_err(ReplayError::Run)?;
-    let step = setup::setup(&config).map_err(ReplayError::Run)?;
-    let step = CouplingStep::new(mesh, step, mapping, smoother, positive);
+    let step = setup::step(&config, mesh).map_err(ReplayError::Run)?;
     let mut run = Exchange {
         partners,
         step,

@@ -136,6 +136,7 @@ impl Bench {
             period: PERIOD,
             voidage_min: 0.0,
             exclude_outside: false,
+            average: None,
             extra: Extra::default(),
         };
         let t = Diffusion::uniform(BANDWIDTH * DIAMETER).links(&mesh);
