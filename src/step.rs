@@ -438,16 +438,16 @@ impl CouplingStep {
         self.clean_work();
         let (q, period, scheme) = (&self.predicted, self.setup.period, self.setup.scheme);
         let ledger = |i: usize| if scheme.conservative() { p.ledger[i] } else { [0.0; 3] };
-        self.weights.deposit(&self.mesh, &self.order.list, &mut self.work, |i| {
-            linearise(&q[i], p.velocity[i], ledger(i), period)
-        });
+        self.weights
+            .deposit(&self.mesh, &self.order.list, &mut self.work, |i| linearise(&q[i], ledger(i), period));
         self.smooth_work(Direction::Spread);
+        let known = if scheme.by_cell() { 0.0 } else { 1.0 };
         let mut positive = true;
         for j in self.active.rows.iter().map(|j| *j as usize) {
             let l = &self.work[j];
             positive &= l[0] >= 0.0 && l[4] >= 0.0;
             self.sources.sp[j] = l[0];
-            self.sources.su[j] = [l[1], l[2], l[3]];
+            self.sources.su[j] = [0, 1, 2].map(|a| l[1 + a] + known * l[0] * self.fluid_velocity[j][a]);
         }
         if !scheme.conservative() {
             let cells = Cells {
@@ -507,7 +507,7 @@ impl CouplingStep {
             let (v, inertia) = (p.velocity[i], p.mass[i]);
             let last = p.history.last(i, v, inertia, s.gravity, s.period);
             let before = Before { drag_coefficient: k, slip, inertia, period: s.period, last };
-            self.predicted[i] = Predicted::new(s.scheme, &before, defect);
+            self.predicted[i] = Predicted::new(s.scheme, &before, defect, gathered);
         }
         if s.extra.forces() {
             self.extra_forces(p);
