@@ -11,7 +11,7 @@ use crate::balance::{Books, ratio};
 use crate::forces::extra::Flow;
 use crate::forces::{Around, DragLaw, Extra, Slip};
 use crate::interpolate::{self, FluidVelocity};
-use crate::linearise::{Predicted, linearise};
+use crate::linearise::{LEVEL, Predicted, linearise};
 use crate::locate::{Locator, Lost};
 use crate::map::{Mapping, Weights};
 use crate::mesh::{Mesh, NONE};
@@ -441,13 +441,12 @@ impl CouplingStep {
         self.weights
             .deposit(&self.mesh, &self.order.list, &mut self.work, |i| linearise(&q[i], ledger(i), period));
         self.smooth_work(Direction::Spread);
-        let known = if scheme.by_cell() { 0.0 } else { 1.0 };
         let mut positive = true;
         for j in self.active.rows.iter().map(|j| *j as usize) {
             let l = &self.work[j];
             positive &= l[0] >= 0.0 && l[4] >= 0.0;
             self.sources.sp[j] = l[0];
-            self.sources.su[j] = [0, 1, 2].map(|a| l[1 + a] + known * l[0] * self.fluid_velocity[j][a]);
+            self.sources.su[j] = [0, 1, 2].map(|a| l[1 + a] + LEVEL * l[0] * self.fluid_velocity[j][a]);
         }
         if !scheme.conservative() {
             let cells = Cells {

@@ -28,10 +28,6 @@ impl Scheme for ConservativeAdaptive {
     fn wants_history(&self) -> bool {
         true
     }
-    fn by_cell(&self) -> bool {
-        // without it free particles few per smoothing volume grow unstable at x ≥ 1e3: B lags by an interval
-        true
-    }
     fn predict(&self, before: &Before) -> (f64, [f64; 3]) {
         let k = before.drag_coefficient;
         let Some(last) = before.last else { return (k, [0.0; 3]) };

@@ -71,11 +71,6 @@ pub trait Scheme: Sync {
     fn wants_solids(&self) -> bool {
         false
     }
-    /// True: implicit in the cell's velocity itself, not in its change: settles in one step, but not to what the
-    /// particles take cell by cell (`linearise`).
-    fn by_cell(&self) -> bool {
-        false
-    }
     /// C (kg/s, ≥ 0) and B (N).
     fn predict(&self, before: &Before) -> (f64, [f64; 3]);
     /// Sp (kg/(m3 s), ≥ 0) and Su (N/m3) of the cells, for a scheme that is not conservative.
