@@ -553,7 +553,7 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("record.first", "", "0", "record the first n exchanges as well"),
     ("record.last", "", "0", "record the last n exchanges before endTime as well"),
     ("record.file", "", "recording.voidage", "the file, below the case folder; never overwritten"),
-    ("record.compression", "", "lz4", "lz4 | none"),
+    ("record.compression", "", "none", "none | lz4: a third smaller, for 4 ms of CPU per 2.6 MB"),
     ("limits.wait", "s", "60", "longest wait for a peer"),
     ("limits.outside", "", "error", "error | exclude: particles outside the mesh"),
     ("limits.voidage_min", "", "0", "cap the voidage from below (counted); 0: stop the run instead"),
