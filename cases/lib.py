@@ -18,13 +18,20 @@ class Check:
 
     def __init__(self, name):
         self.name, self.failed, self.count = name, 0, 0
-        self.quick = "--quick" in sys.argv
-        if set(sys.argv[1:]) - {"--quick"}:
-            sys.exit(f"{name}/check: unknown arguments; type: cases/{name}/check [--quick]")
+        words = sys.argv[1:]
+        self.only = words.pop(words.index("--only") + 1) if "--only" in words[:-1] else ""
+        self.quick = "--quick" in words
+        if set(words) - {"--quick", "--only"} or (not self.only and "--only" in words):
+            sys.exit(f"{name}/check: unknown arguments; type: cases/{name}/check [--quick] [--only TEXT], "
+                     "TEXT a part of the labels it prints, for example '(2, 1)'")
         if not os.path.exists(VOIDAGE):
             sys.exit(f"{VOIDAGE} is missing; type: ./setup build")
         self.scratch = tempfile.mkdtemp(prefix=f"voidage-{name}-")
         print(f"{'what':58} {'measured':>13} {'expected':>13} {'tolerance':>10}")
+
+    def wants(self, label):
+        """False: left out by --only."""
+        return self.only in label
 
     def near(self, what, measured, expected, tolerance):
         """Relative deviation at most `tolerance`."""
@@ -72,6 +79,8 @@ class Check:
 
     def done(self):
         shutil.rmtree(self.scratch, ignore_errors=True)
+        if not self.count:
+            sys.exit(f"{self.name}/check: no label has '{self.only}'")
         print(f"{self.name}: {self.count - self.failed} of {self.count} numbers within tolerance")
         sys.exit(1 if self.failed else 0)
 

@@ -12,6 +12,7 @@ use crate::monitor::{Monitor, Row};
 use crate::output::restart::{self, Sets, State};
 use crate::particles::{ParticleError, Particles};
 use crate::partners::{PartnerError, Partners};
+use crate::record::{RecordError, Recorder};
 use crate::step::{CouplingStep, Fluid, StepError};
 use crate::sums::norm;
 use serde::{Deserialize, Serialize};
@@ -52,6 +53,9 @@ pub enum CoupleError {
     /// Partners disagree.
     #[error("{0}")]
     OutOfStep(String),
+    /// The recording.
+    #[error(transparent)]
+    Record(#[from] RecordError),
     /// A file.
     #[error("{what}: {source}")]
     File {
@@ -86,6 +90,23 @@ pub fn receive_mesh<T: Transport>(partners: &mut Partners<T>) -> Result<Mesh, Co
         pieces.push(MeshPiece::from_frame(rank, &Frame::parse(&sample)?)?);
     }
     Ok(mesh::assemble(&pieces)?)
+}
+
+/// Puts the fluid of one CFD rank, whose cells have these slots, among that of all `n` cells.
+pub fn take_fluid(frame: &Frame, slots: &[u32], n: usize, fluid: &mut Fluid) -> Result<(), WireError> {
+    for (name, to) in [
+        (field::FLUID_VELOCITY, &mut fluid.velocity),
+        (field::PRESSURE_GRADIENT, &mut fluid.pressure_gradient),
+        (field::STRESS_DIVERGENCE, &mut fluid.stress_divergence),
+    ] {
+        if name != field::FLUID_VELOCITY && frame.raw(name).is_none() {
+            continue;
+        }
+        to.resize(n, [0.0; 3]);
+        let values = frame.vectors_of(name, slots.len())?;
+        slots.iter().zip(values).for_each(|(slot, v)| to[*slot as usize] = *v);
+    }
+    Ok(())
 }
 
 /// What a write time hands to the output.
@@ -124,12 +145,25 @@ pub struct Exchange<'a, T: Transport> {
     pub resume: Option<State>,
     /// Writes restart sets at the fluid's write times.
     pub sets: Option<Sets>,
-    /// monitor.csv
-    pub monitor: Monitor,
+    /// monitor.csv; `None` in a replay
+    pub monitor: Option<Monitor>,
+    /// Keeps the exchanges; what it misses of them passes its transport.
+    pub recorder: Option<Recorder>,
     /// Told after each exchange.
     pub progress: &'a mut dyn FnMut(&Row, &Summary),
     /// Told at the fluid's write times.
     pub write: &'a mut dyn FnMut(&Snapshot) -> std::io::Result<()>,
+}
+
+/// What goes from one exchange to the next beside the step's own.
+#[derive(Default)]
+pub struct Course {
+    fluid: Fluid,
+    open: Option<Open>,
+    /// ledger of vanished particles, N s
+    left: [f64; 3],
+    /// so far
+    pub summary: Summary,
 }
 
 /// A row that waits for the DEM's report on the interval it is about.
@@ -149,94 +183,108 @@ impl<T: Transport> Exchange<'_, T> {
     }
 
     fn exchanges(&mut self) -> Result<Summary, CoupleError> {
-        let mut summary = Summary::default();
-        let mut fluid = Fluid::default();
-        let mut open: Option<Open> = None;
-        let mut left = [0.0; 3];
-        let mut from = 0;
+        let mut course = Course::default();
+        let mut k = 0;
         if let Some(s) = self.resume.take() {
-            from = s.exchange + 1;
-            (left, summary) = (s.left, s.summary);
-            open = Some(self.take_up(&s)?);
+            k = s.exchange + 1;
+            (course.left, course.summary) = (s.left, s.summary);
+            course.open = Some(self.take_up(&s)?);
         }
-        for k in from.. {
-            let begin = Instant::now();
-            let time = self.start + k as f64 * self.period;
-            let (first, mut wait_cfd, mut last, mut write) = (k == 0, Duration::ZERO, false, true);
-            let mut reaction = [0.0; 3];
-            if first {
-                (last, _, _) = self.receive_fluid(k, &mut fluid, &mut wait_cfd)?;
+        while !self.exchange(k, &mut course)? {
+            k += 1;
+        }
+        Ok(course.summary)
+    }
+
+    /// Exchange k. True: it was the last.
+    pub fn exchange(&mut self, k: i64, course: &mut Course) -> Result<bool, CoupleError> {
+        let begin = Instant::now();
+        let time = self.start + k as f64 * self.period;
+        if let Some(r) = &self.recorder {
+            r.begin(k, time, &self.step)?;
+        }
+        let (first, mut wait_cfd, mut last, mut write) = (k == 0, Duration::ZERO, false, true);
+        let mut reaction = [0.0; 3];
+        if first {
+            (last, _, _) = self.receive_fluid(k, &mut course.fluid, &mut wait_cfd)?;
+        }
+        let waiting = Instant::now();
+        let mut particles = self.receive_particles(k)?;
+        let wait_dem = waiting.elapsed();
+        if let Some(o) = course.open.take() {
+            self.close(o, Some(&particles), course)?;
+        }
+        let stage = |source| CoupleError::Step { step: k, source };
+        let step = &mut self.step;
+        match &self.pool {
+            Some(pool) => pool.install(|| step.before_fluid(&mut particles, first)),
+            None => step.before_fluid(&mut particles, first),
+        }
+        .map_err(stage)?;
+        self.send_sources(k, time)?;
+        if !first {
+            (last, write, reaction) = self.receive_fluid(k, &mut course.fluid, &mut wait_cfd)?;
+        }
+        let (step, fluid) = (&mut self.step, &course.fluid);
+        match &self.pool {
+            Some(pool) => pool.install(|| step.after_fluid(&particles, fluid, first)),
+            None => step.after_fluid(&particles, fluid, first),
+        }
+        .map_err(stage)?;
+        self.step.books.reaction = reaction;
+        let file = |source| CoupleError::File { what: "restart set", source };
+        let set = match &self.sets {
+            Some(sets) if write && !first => Some(sets.begin(time).map_err(file)?),
+            _ => None,
+        };
+        if last {
+            self.partners.release_cfd();
+        }
+        if last && set.is_none() {
+            self.partners.stop("");
+        } else {
+            self.send_drive(k, time, &particles, set.as_deref(), last)?;
+        }
+        if write {
+            self.step.form_solids_flux(&particles);
+            let fluid = &course.fluid;
+            let snapshot = Snapshot { k, time, particles: &particles, step: &self.step, fluid };
+            (self.write)(&snapshot).map_err(|source| CoupleError::File { what: "write fields", source })?;
+        }
+        let mut o = self.open_row(k, time, &particles, &mut course.summary);
+        o.row.wait_dem = wait_dem.as_secs_f64();
+        o.row.wait_cfd = wait_cfd.as_secs_f64();
+        o.row.coupler = begin.elapsed().as_secs_f64() - o.row.wait_dem - o.row.wait_cfd;
+        let summary = &mut course.summary;
+        summary.coupler += o.row.coupler;
+        summary.wait_dem += o.row.wait_dem;
+        summary.wait_cfd += o.row.wait_cfd;
+        summary.steps = k;
+        summary.time = time;
+        if let Some(set) = set {
+            for i in self.partners.dem() {
+                self.partners.receive(i, kind::WRITTEN, "word that its restart file is written")?;
             }
-            let waiting = Instant::now();
-            let mut particles = self.receive_particles(k)?;
-            let wait_dem = waiting.elapsed();
-            if let Some(o) = open.take() {
-                self.close(o, Some(&particles), &mut left, &mut summary)?;
-            }
-            let stage = |source| CoupleError::Step { step: k, source };
-            let step = &mut self.step;
-            match &self.pool {
-                Some(pool) => pool.install(|| step.before_fluid(&mut particles, first)),
-                None => step.before_fluid(&mut particles, first),
-            }
-            .map_err(stage)?;
-            self.send_sources(k, time)?;
-            if !first {
-                (last, write, reaction) = self.receive_fluid(k, &mut fluid, &mut wait_cfd)?;
-            }
-            let step = &mut self.step;
-            match &self.pool {
-                Some(pool) => pool.install(|| step.after_fluid(&particles, &fluid, first)),
-                None => step.after_fluid(&particles, &fluid, first),
-            }
-            .map_err(stage)?;
-            self.step.books.reaction = reaction;
-            let file = |source| CoupleError::File { what: "restart set", source };
-            let set = match &self.sets {
-                Some(sets) if write && !first => Some(sets.begin(time).map_err(file)?),
-                _ => None,
-            };
             if last {
-                self.partners.release_cfd();
-            }
-            if last && set.is_none() {
                 self.partners.stop("");
-            } else {
-                self.send_drive(k, time, &particles, set.as_deref(), last)?;
             }
-            if write {
-                self.step.form_solids_flux(&particles);
-                let snapshot = Snapshot { k, time, particles: &particles, step: &self.step, fluid: &fluid };
-                (self.write)(&snapshot)
-                    .map_err(|source| CoupleError::File { what: "write fields", source })?;
-            }
-            let mut o = self.open_row(k, time, &particles, &mut summary);
-            o.row.wait_dem = wait_dem.as_secs_f64();
-            o.row.wait_cfd = wait_cfd.as_secs_f64();
-            o.row.coupler = begin.elapsed().as_secs_f64() - o.row.wait_dem - o.row.wait_cfd;
-            summary.coupler += o.row.coupler;
-            summary.wait_dem += o.row.wait_dem;
-            summary.wait_cfd += o.row.wait_cfd;
-            summary.steps = k;
-            summary.time = time;
-            if let Some(set) = set {
-                for i in self.partners.dem() {
-                    self.partners.receive(i, kind::WRITTEN, "word that its restart file is written")?;
-                }
-                if last {
-                    self.partners.stop("");
-                }
-                let state = self.state(k, &particles, &fluid, &o, left, &summary);
-                self.sets.iter().try_for_each(|s| s.finish(&set, state.clone())).map_err(file)?;
-            }
-            (self.progress)(&o.row, &summary);
-            if last {
-                self.close(o, None, &mut left, &mut summary)?;
-                return Ok(summary);
-            }
-            open = Some(o);
+            let state = self.state(k, &particles, &course.fluid, &o, course.left, &course.summary);
+            self.sets.iter().try_for_each(|s| s.finish(&set, state.clone())).map_err(file)?;
         }
-        Ok(summary)
+        (self.progress)(&o.row, &course.summary);
+        course.open = Some(o);
+        if last {
+            self.pause(course)?;
+        }
+        Ok(last)
+    }
+
+    /// No exchange follows that could complete the row at hand: the run is over, or the next one is not recorded.
+    pub fn pause(&mut self, course: &mut Course) -> Result<(), CoupleError> {
+        match course.open.take() {
+            Some(o) => self.close(o, None, course),
+            None => Ok(()),
+        }
     }
 
     /// The set of exchange k, as far as the exchanges know it.
@@ -303,7 +351,7 @@ impl<T: Transport> Exchange<'_, T> {
                 "the DEM brought other particles back ({was} were saved, {now} came, or their values changed after read_restart)"
             )));
         }
-        self.step.restore(&s.voidage, &s.velocity);
+        self.step.restore(&s.voidage, &s.velocity, &[]);
         self.send_sources(k, s.time)?;
         Ok(Open { row: s.row, books: s.books })
     }
@@ -345,19 +393,7 @@ impl<T: Transport> Exchange<'_, T> {
             *waited += begin.elapsed();
             let frame = Frame::parse(&sample)?;
             Self::in_step(frame.step(), k, &self.partners.who(i))?;
-            let slots = &self.step.mesh.slots[piece];
-            for (name, to) in [
-                (field::FLUID_VELOCITY, &mut fluid.velocity),
-                (field::PRESSURE_GRADIENT, &mut fluid.pressure_gradient),
-                (field::STRESS_DIVERGENCE, &mut fluid.stress_divergence),
-            ] {
-                if name != field::FLUID_VELOCITY && frame.raw(name).is_none() {
-                    continue;
-                }
-                to.resize(n, [0.0; 3]);
-                let values = frame.vectors_of(name, slots.len())?;
-                slots.iter().zip(values).for_each(|(slot, v)| to[*slot as usize] = *v);
-            }
+            take_fluid(&frame, &self.step.mesh.slots[piece], n, fluid)?;
             let (f, r) = (frame.f64s_of(field::FLAGS, 2)?, frame.f64s_of(field::REACTION, 3)?);
             flags = [f[0], f[1]];
             (0..3).for_each(|a| reaction[a] += r[a]);
@@ -488,9 +524,9 @@ impl<T: Transport> Exchange<'_, T> {
         &mut self,
         mut o: Open,
         next: Option<&Particles>,
-        left: &mut [f64; 3],
-        summary: &mut Summary,
+        course: &mut Course,
     ) -> Result<(), CoupleError> {
+        let Course { left, summary, .. } = course;
         if let Some(p) = next {
             // action = impulse applied + change of the ledger; vanished particles' ledger goes to `left`
             let conservative = self.step.conservative();
@@ -510,6 +546,12 @@ impl<T: Transport> Exchange<'_, T> {
         summary.ledger_left = o.row.ledger_left;
         summary.worst_action_reaction =
             summary.worst_action_reaction.max(o.row.action_reaction_error.unwrap_or_default());
-        self.monitor.write(&o.row).map_err(|source| CoupleError::File { what: "monitor.csv", source })
+        if let Some(r) = &self.recorder {
+            r.row(&o.row)?;
+        }
+        self.monitor
+            .iter_mut()
+            .try_for_each(|m| m.write(&o.row))
+            .map_err(|source| CoupleError::File { what: "monitor.csv", source })
     }
 }

@@ -37,8 +37,10 @@ pub mod threads;
 
 pub mod comm;
 pub mod couple;
+pub mod inspect;
 pub mod launch;
 pub mod monitor;
 pub mod output;
 pub mod partners;
+pub mod record;
 pub mod setup;

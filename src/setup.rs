@@ -8,7 +8,7 @@ use crate::mesh::Mesh;
 use crate::output::restart::State;
 use crate::partners::Partners;
 use crate::smooth::{self, Classes, Diffusion, Pinned, Smoother};
-use crate::step::Setup;
+use crate::step::{CouplingStep, Setup};
 use crate::{forces, map, scheme};
 use voidage_wire::{Transport, Welcome};
 
@@ -107,6 +107,15 @@ pub fn smoothers(c: &Config, mesh: &Mesh) -> Result<[Box<dyn Smoother>; 2], Stri
         return smooth::pair(&s.method, mesh, &t, s.tolerance).ok_or_else(unknown);
     }
     smooth::pair(&s.method, &classes.mesh(mesh), &t, s.tolerance).ok_or_else(unknown)
+}
+
+/// The coupling step of a case on a mesh.
+pub fn step(c: &Config, mesh: Mesh) -> Result<CouplingStep, String> {
+    let [smoother, positive] = smoothers(c, &mesh)?;
+    let mapping = mapping(c, &mesh)?;
+    let (classes, pinned) = (classes(c, &mesh), pinned(c, &mesh));
+    let step = CouplingStep::new(mesh, setup(c)?, mapping, smoother, positive);
+    Ok(step.with_classes(classes).with_pinned(pinned))
 }
 
 /// What the partners are told (names in `docs/wire.md`).

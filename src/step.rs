@@ -12,7 +12,7 @@ use crate::forces::extra::{Each, Flow};
 use crate::forces::history::Memory;
 use crate::forces::{Around, DragLaw, Extra, Slip};
 use crate::interpolate::{self, FluidVelocity};
-use crate::linearise::{Predicted, linearise};
+use crate::linearise::{LEVEL, Predicted, linearise};
 use crate::locate::{Locator, Lost};
 use crate::map::{Mapping, Weights};
 use crate::mesh::{Mesh, NONE};
@@ -212,6 +212,8 @@ struct Batch {
     slips: Vec<Slip>,
     /// u − v, m/s
     vectors: Vec<[f64; 3]>,
+    /// ũ, m/s
+    gathered: Vec<[f64; 3]>,
     /// K, kg/s
     drag: Vec<f64>,
 }
@@ -358,11 +360,23 @@ impl CouplingStep {
         Self { pinned, ..self }
     }
 
-    /// Puts the voidage and the fluid velocity at the start of the coming step (restart).
-    pub fn restore(&mut self, voidage: &[f64], fluid_velocity: &[[f64; 3]]) {
+    /// What the step carries from one exchange to the next: voidage, fluid velocity (m/s), and that of one step earlier
+    /// (empty where nothing needs it).
+    pub fn carried(&self) -> (&[f64], &[[f64; 3]], &[[f64; 3]]) {
+        (&self.sources.voidage, &self.fluid_velocity, &self.fluid_before)
+    }
+
+    /// Puts what the step carries into the coming exchange (restart, recording): see `carried`.
+    pub fn restore(&mut self, voidage: &[f64], fluid_velocity: &[[f64; 3]], before: &[[f64; 3]]) {
         self.sources.voidage.copy_from_slice(voidage);
         self.fluid_velocity.copy_from_slice(fluid_velocity);
+        self.fluid_before = before.to_vec();
         self.filled = (0..self.mesh.len() as u32).collect();
+    }
+
+    /// The smoother of this run.
+    pub fn smoother(&self) -> &dyn Smoother {
+        &*self.smoother
     }
 
     /// Where the particles of this exchange lie; those of the next one are best stored alike.
@@ -612,9 +626,8 @@ impl CouplingStep {
         let (q, period, scheme) = (&self.predicted, self.setup.period, self.setup.scheme);
         let ledger = |i: usize| if scheme.conservative() { p.ledger[i] } else { [0.0; 3] };
         let mesh = self.wide.as_ref().unwrap_or(&self.mesh);
-        self.weights.deposit(mesh, &self.order, &mut self.work, |i, _: &mut ()| {
-            linearise(&q[i], p.velocity[i], ledger(i), period)
-        });
+        self.weights
+            .deposit(mesh, &self.order, &mut self.work, |i, _: &mut ()| linearise(&q[i], ledger(i), period));
         self.smooth_work(Direction::Spread);
         self.sum_classes();
         let other = self.wide.is_some() || self.setup.average.is_some();
@@ -622,7 +635,7 @@ impl CouplingStep {
         let pieces = threads::rows(rows, self.mesh.len());
         let ends = || pieces.iter().map(|p| p.1.end);
         let lanes = if self.wide.is_some() { &self.total[..] } else { &self.work };
-        let s = &mut self.sources;
+        let (s, fluid) = (&mut self.sources, &self.fluid_velocity);
         let parts = threads::cut(&mut s.sp, ends()).into_iter().zip(threads::cut(&mut s.su, ends()));
         let positive = threads::map(pieces.iter().zip(parts).collect(), |((rows, slots), (sp, su))| {
             let mut positive = true;
@@ -630,7 +643,7 @@ impl CouplingStep {
                 let l = &lanes[j];
                 positive &= l[0] >= 0.0 && l[4] >= 0.0;
                 sp[j - slots.start] = l[0];
-                su[j - slots.start] = [l[1], l[2], l[3]];
+                su[j - slots.start] = [0, 1, 2].map(|a| l[1 + a] + LEVEL * l[0] * fluid[j][a]);
             }
             positive
         });
@@ -676,6 +689,7 @@ impl CouplingStep {
         let around = s.drag.looks_around();
         b.slips.clear();
         b.vectors.clear();
+        b.gathered.clear();
         b.drag.resize(out.len(), 0.0);
         for k in 0..out.len() {
             let i = begin + k;
@@ -709,6 +723,7 @@ impl CouplingStep {
             }
             b.slips.push(slip);
             b.vectors.push(vector);
+            b.gathered.push(gathered);
         }
         if !around {
             s.drag.coefficients(&b.slips, &mut b.drag);
@@ -722,7 +737,7 @@ impl CouplingStep {
             let last = p.history.last(i, v, inertia, s.gravity, s.period);
             let drag_coefficient = b.drag[k] * share;
             let before = Before { drag_coefficient, slip: b.vectors[k], inertia, period: s.period, last };
-            out[k] = Predicted::new(s.scheme, &before, out[k].defect);
+            out[k] = Predicted::new(s.scheme, &before, out[k].defect, b.gathered[k]);
         }
     }
 

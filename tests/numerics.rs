@@ -7,6 +7,7 @@ use common::{Hex, P, cloud, message, random};
 use voidage::arrange::Places;
 use voidage::couple::receive_mesh;
 use voidage::interpolate::FluidVelocity;
+use voidage::linearise::LEVEL;
 use voidage::locate::Locator;
 use voidage::map::ParticleCentroid;
 use voidage::mesh::made::Made;
@@ -530,6 +531,48 @@ fn what_has_no_reaction_never_reaches_the_fluid_not_even_in_the_first_interval()
         let (_, _, su, _) = exchange(at_rest(ledger), false);
         assert!(su.iter().flatten().all(|x| *x == 0.0), "{name}: {ledger:?} was given to the fluid");
     }
+}
+
+#[test]
+fn a_steady_cell_is_dragged_by_half_its_own_and_half_the_gathered_velocity() {
+    // Su - Sp U = -G[K (u~ - v)] + (1 - theta) (G[K u~] - Sp U); explicit gives -G[K (u~ - v)], and with U = 0 G[K v]
+    let mesh = assemble(&meshes()[3].whole()).unwrap();
+    let f = fluid(&mesh);
+    let still = Fluid { velocity: vec![[0.0; 3]; mesh.len()], ..fluid(&mesh) };
+    let words = message(&cloud(300, SIZE, 2e-4));
+    let sources = |name: &str, f: &Fluid| {
+        let g = || smoother("chebyshev", &mesh, 0.02, 1e-9);
+        let s =
+            Setup { drag: forces::by_name("stokes").unwrap(), ..setup(name, FluidVelocity::Gather, false) };
+        let mut step = CouplingStep::new(mesh.clone(), s, Box::new(ParticleCentroid), g(), g());
+        for first in [true, false] {
+            let frame = Frame::parse(&words).unwrap();
+            let mut p = Particles::receive(&[frame], &Places::default()).unwrap();
+            step.before_fluid(&mut p, first).unwrap();
+            if first {
+                step.after_fluid(&p, f, first).unwrap();
+            }
+        }
+        step.sources.clone()
+    };
+    let (c, e, e0) = (sources("conservative", &f), sources("explicit", &f), sources("explicit", &still));
+    assert!(c.sp.iter().any(|x| *x > 0.0) && e.sp.iter().all(|x| *x == 0.0));
+    let size = e.su.iter().flatten().fold(0.0, |a: f64, b| a.max(b.abs()));
+    let mut differ = 0.0_f64;
+    for (j, u) in f.velocity.iter().enumerate() {
+        for a in 0..3 {
+            let own = c.sp[j] * u[a];
+            let gathered = e0.su[j][a] - e.su[j][a];
+            let due = e.su[j][a] + (1.0 - LEVEL) * (gathered - own);
+            assert!(
+                (c.su[j][a] - own - due).abs() < 1e-12 * size,
+                "cell {j}: {:e}, {due:e}",
+                c.su[j][a] - own
+            );
+            differ = differ.max((gathered - own).abs() / size);
+        }
+    }
+    assert!(differ > 0.1, "the two velocities differ here");
 }
 
 #[test]

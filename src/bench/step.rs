@@ -5,6 +5,7 @@
 //! the errors the step itself reports. Receiving and sending are not in it.
 
 use super::scene;
+use super::triad::cpu_seconds;
 use crate::forces::Extra;
 use crate::interpolate::FluidVelocity;
 use crate::map;
@@ -12,13 +13,14 @@ use crate::smooth;
 use crate::step::{CouplingStep, Seconds, Setup};
 use crate::{forces, scheme};
 use serde::Serialize;
-use std::time::Instant;
 
 /// The step to be timed.
 #[derive(Clone, Debug)]
 pub struct Case {
     /// number of particles
     pub particles: usize,
+    /// of the spheres, m
+    pub diameter: f64,
     /// number of cells wanted
     pub cells: usize,
     /// b, m
@@ -97,14 +99,14 @@ pub fn run(case: &Case) -> Result<Cost, String> {
     let fluid = scene::air(&mesh);
     let mapping = map::all().into_iter().find(|m| m.name() == case.mapping);
     let mut mapping = mapping.ok_or_else(|| format!("mapping {} is not known", case.mapping))?;
-    mapping.prepare(&mesh, &map::Options { bandwidth: case.bandwidth, grid: 2.4 * scene::DIAMETER });
+    mapping.prepare(&mesh, &map::Options { bandwidth: case.bandwidth, grid: 2.4 * case.diameter });
     let t = smooth::Diffusion::uniform(case.bandwidth).links(&mesh);
     let graph = std::sync::Arc::new(smooth::Graph::new(&mesh, &t));
     let smoother = |name| smooth::on(name, &mesh, &t, &graph, case.tolerance).ok_or("no smoother");
     let (main, positive) = (smoother("chebyshev")?, smoother("uniformization")?);
     let (cells, degree) = (mesh.len(), main.degree());
     let mut step = CouplingStep::new(mesh, setup(case.drag)?, mapping, main, positive);
-    let mut p = scene::bed(scene::BOX, case.particles, scene::DIAMETER);
+    let mut p = scene::bed(scene::BOX, case.particles, case.diameter);
     let mut seed = 7;
     let mut cost = Cost {
         mapping: case.mapping,
@@ -116,10 +118,10 @@ pub fn run(case: &Case) -> Result<Cost, String> {
     };
     let mut all = Vec::new();
     for k in 0..=case.repetitions {
-        let begin = Instant::now();
+        let begin = cpu_seconds();
         step.before_fluid(&mut p, k == 0).map_err(|e| e.to_string())?;
         step.after_fluid(&p, &fluid, k == 0).map_err(|e| e.to_string())?;
-        let us = begin.elapsed().as_secs_f64() * 1e6 / p.len() as f64;
+        let us = (cpu_seconds() - begin) * 1e6 / p.len() as f64;
         cost.solid_volume_error = cost.solid_volume_error.max(step.facts.solid_volume_error);
         for x in &mut p.position {
             (0..3).for_each(|a| x[a] += 2e-5 * (scene::random(&mut seed) - 0.5));

@@ -54,6 +54,14 @@ pub fn check(c: &Config) -> Vec<Problem> {
     p
 }
 
+/// Problems of the settings alone, without the files of a case.
+pub fn settings(c: &Config) -> Vec<Problem> {
+    let mut p = Vec::new();
+    values(c, &mut p);
+    models(c, &mut p);
+    p
+}
+
 fn values(c: &Config, p: &mut Vec<Problem>) {
     let f = &c.file;
     if f.format != 1 {

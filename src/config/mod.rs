@@ -12,7 +12,7 @@ mod raw;
 mod resolution;
 pub mod script;
 
-pub use check::check;
+pub use check::{check, settings};
 use raw::parse;
 pub use raw::*;
 
@@ -136,4 +136,18 @@ pub fn load(folder: &Path, overrides: &[(String, String)]) -> Result<Config, Vec
         config.file.smooth.bandwidth = bandwidth::from_wake(&config).map_err(|p| vec![p])?;
     }
     Ok(config)
+}
+
+/// The case of a recording: its text, with overrides; `control` as it ran. Paths lead nowhere.
+pub fn recorded(
+    text: &str,
+    overrides: &[(String, String)],
+    control: foam::Control,
+) -> Result<Config, Vec<Problem>> {
+    let (file, wake) = parse(text, overrides)?;
+    if wake {
+        let fix = "smooth.bandwidth = 0.0048";
+        return Err(vec![Problem::error("smooth.bandwidth", "wake", "a number in m for a recording", fix)]);
+    }
+    Ok(Config { folder: PathBuf::new(), file, control })
 }

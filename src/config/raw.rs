@@ -29,6 +29,8 @@ pub struct CaseFile {
     pub output: Output,
     #[serde(default)]
     pub limits: Limits,
+    #[serde(default)]
+    pub record: Record,
 }
 
 /// Section `run`.
@@ -385,6 +387,32 @@ impl Default for Limits {
     }
 }
 
+/// How recorded messages are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)]
+pub enum Compression {
+    None,
+    Lz4,
+}
+
+/// Section `record`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs)]
+pub struct Record {
+    pub every: u32,
+    pub first: u32,
+    pub last: u32,
+    pub file: PathBuf,
+    pub compression: Compression,
+}
+impl Default for Record {
+    fn default() -> Self {
+        Self { every: 0, first: 0, last: 0, file: "recording.voidage".into(), compression: Compression::Lz4 }
+    }
+}
+
 /// Reference of all keys: key, unit, default ("-" = must be given), meaning.
 pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("format", "", "-", "version of this file, 1"),
@@ -516,6 +544,16 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
         "2",
         "restart sets kept, written at the fluid's write times (voidage run --restart); 0: none",
     ),
+    (
+        "record.every",
+        "",
+        "0",
+        "record every n-th exchange; 1: all; 0: none (voidage replay, inspect, export)",
+    ),
+    ("record.first", "", "0", "record the first n exchanges as well"),
+    ("record.last", "", "0", "record the last n exchanges before endTime as well"),
+    ("record.file", "", "recording.voidage", "the file, below the case folder; never overwritten"),
+    ("record.compression", "", "none", "none | lz4: a third smaller, for 4 ms of CPU per 2.6 MB"),
     ("limits.wait", "s", "60", "longest wait for a peer"),
     ("limits.outside", "", "error", "error | exclude: particles outside the mesh"),
     ("limits.voidage_min", "", "0", "cap the voidage from below (counted); 0: stop the run instead"),

@@ -17,6 +17,8 @@ pub struct Script {
     pub boundary: Option<[String; 3]>,
     /// particles of the data file
     pub count: Option<f64>,
+    /// file of `read_data`
+    pub data: Option<std::path::PathBuf>,
     pub has_fix: bool,
     pub has_run: bool,
     /// takes particles from a restart file
@@ -56,6 +58,7 @@ pub fn read(path: &Path, given: &BTreeMap<String, String>) -> Result<Script, Str
                 if let Some((radius, density)) = file.as_ref().and_then(|f| data_spheres(f)) {
                     (s.radius, s.density) = (s.radius.or(Some(radius)), s.density.or(Some(density)));
                 }
+                s.data = file;
             }
             Some("read_restart") => s.has_restart = true,
             Some("fix") if w.get(3) == Some(&"voidage") => s.has_fix = true,
@@ -100,6 +103,19 @@ fn substitute(line: &str, variables: &BTreeMap<String, String>) -> String {
 fn data_count(path: &Path) -> Option<f64> {
     let text = std::fs::read_to_string(path).ok()?;
     text.lines().take(40).find_map(|l| l.trim().strip_suffix("atoms")?.trim().parse().ok())
+}
+
+/// Mean diameter (m) and density (kg/m3) of a data file of `atom_style granular` (id type diameter density x y z).
+pub fn spheres(path: &Path) -> Option<(f64, f64)> {
+    let text = std::fs::read_to_string(path).ok()?;
+    let rows = text.lines().skip_while(|l| !l.starts_with("Atoms")).skip(1).filter(|l| !l.trim().is_empty());
+    let rows = rows.map_while(|l| {
+        let v: Vec<f64> = l.split_whitespace().map_while(|w| w.parse().ok()).collect();
+        (v.len() >= 7).then(|| (v[2], v[3]))
+    });
+    let (mut d, mut rho, mut n) = (0.0, 0.0, 0.0);
+    rows.for_each(|r| (d, rho, n) = (d + r.0, rho + r.1, n + 1.0));
+    (n > 0.0 && d > 0.0 && rho > 0.0).then(|| (d / n, rho / n))
 }
 
 /// "lo hi xlo xhi" lines at the head of a data file.

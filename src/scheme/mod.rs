@@ -43,7 +43,7 @@ pub struct Before {
 
 /// What a scheme may look at to form Sp and Su of the cells; by cell slot.
 pub struct Cells<'a> {
-    /// smoothed lanes of `linearise`: 0 C, 1–3 C (v − d) − B − L/Δt, 4 K
+    /// smoothed lanes of `linearise`: 1–3 −B, 4 K (C = 0 and no ledger here)
     pub smoothed: &'a [Lanes],
     /// smoothed ε_s (0) and ε_s U_s (1–3)
     pub solids: &'a [Lanes],
@@ -75,13 +75,8 @@ pub trait Scheme: Sync {
     }
     /// C (kg/s, ≥ 0) and B (N).
     fn predict(&self, before: &Before) -> (f64, [f64; 3]);
-    /// Sp (kg/(m3 s), ≥ 0) and Su (N/m3) of the cells. A conservative scheme keeps the default.
-    fn sources(&self, cells: &Cells, sp: &mut [f64], su: &mut [[f64; 3]]) {
-        for (j, l) in cells.smoothed.iter().enumerate() {
-            sp[j] = l[0];
-            su[j] = [l[1], l[2], l[3]];
-        }
-    }
+    /// Sp (kg/(m3 s), ≥ 0) and Su (N/m3) of the cells, for a scheme that is not conservative.
+    fn sources(&self, _cells: &Cells, _sp: &mut [f64], _su: &mut [[f64; 3]]) {}
 }
 
 /// All schemes.

@@ -16,11 +16,15 @@ mod classes;
 pub mod coefficients;
 mod diffusion;
 mod direct;
+pub mod factors;
 mod field;
 mod graph;
 mod pcg;
 mod pinned;
 mod polynomial;
+mod product;
+mod real;
+mod recurrence;
 mod sweep;
 pub mod wake;
 
@@ -137,7 +141,7 @@ pub const NAMES: &[&str] = &[
 
 /// Above this tolerance `chebyshev` keeps the kernel's variance exactly; below, the plain series is nearer to exp(Δ_T).
 const MATCHED: f64 = 1e-3;
-/// Residual at which the implicit solves end, relative to the first (the papers' baseline).
+/// Normalised residual at which the implicit solves end (OpenFOAM's `tolerance`; the papers' baseline).
 const SOLVED: f64 = 1e-6;
 /// Steps of `backward-euler`.
 const EULER_STEPS: usize = 4;
