@@ -7,6 +7,7 @@
 use super::{Chunk, End, Head, Reader, RecordError};
 use crate::arrange::Places;
 use crate::couple::take_fluid;
+use crate::forces::history::Memory;
 use crate::mesh::{Mesh, MeshPiece, assemble};
 use crate::monitor::Row;
 use crate::particles::Particles;
@@ -115,7 +116,7 @@ impl Messages {
     /// The reply to the DEM, particles as in `p`; empty arrays if there is none, or a part of it is missing.
     pub fn drive(&self, p: &Particles) -> Result<Drive, RecordError> {
         let mut a = self.particle_arrays(p)?;
-        if a.len() < DRIVE.len() {
+        if DRIVE[..DRIVE_ALWAYS].iter().any(|d| !a.contains_key(&d.0)) {
             return Ok(Drive::default());
         }
         let drag_coefficient = a.remove(&field::DRAG_COEFFICIENT).unwrap_or_default();
@@ -130,8 +131,18 @@ impl Messages {
 pub const SOURCES: [(u32, usize); 5] =
     [(field::VOIDAGE, 1), (field::VOIDAGE_OLD, 1), (field::SP, 1), (field::SU, 3), (field::SOLIDS_FLUX, 3)];
 /// Arrays of DRIVE and their width.
-pub const DRIVE: [(u32, usize); 4] =
-    [(field::DRAG_COEFFICIENT, 1), (field::DRIVE_VELOCITY, 3), (field::FORCE, 3), (field::CHARGED, 3)];
+pub const DRIVE: [(u32, usize); 8] = [
+    (field::DRAG_COEFFICIENT, 1),
+    (field::DRIVE_VELOCITY, 3),
+    (field::FORCE, 3),
+    (field::CHARGED, 3),
+    (field::ADDED_MASS, 1),
+    (field::ROTATION_COEFFICIENT, 1),
+    (field::ROTATION_RATE, 3),
+    (field::MEMORY, Memory::WIDTH),
+];
+/// How many of them are always there.
+const DRIVE_ALWAYS: usize = 4;
 
 fn vectors(flat: Vec<f64>) -> Vec<[f64; 3]> {
     flat.chunks_exact(3).map(|v| [v[0], v[1], v[2]]).collect()
