@@ -59,9 +59,10 @@ pub fn of(c: &Config, particles: u64, cells: u64) -> Forecast {
     let (exchanges, states) = count(&Selection::of(c));
     let exchange = particles * particle + cells * cell + 1000;
     let state = 8 * 7 * cells;
-    // a mesh of hexahedra: 3 faces of 4 corners and a point per cell
-    let mesh = cells * 8 * (3 + 3 * (4 + 1 + 2) + 1);
-    Forecast { exchanges, exchange, state, total: mesh + exchanges * exchange + states * state }
+    // hexahedra: 3 faces of 4 corners and a point per cell are 25 words; walls add to small meshes, other cells have more
+    let mesh = cells * 8 * 40 + 10_000;
+    let rows = 250 * (c.steps() + 1);
+    Forecast { exchanges, exchange, state, total: mesh + rows + exchanges * exchange + states * state }
 }
 
 /// Of a case, as far as its files tell; the error says what they do not.
