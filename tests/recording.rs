@@ -143,6 +143,8 @@ fn what_a_replay_cannot_change_is_refused() {
         [("coupling.model", "A"), ("forces.pressure_gradient", "true"), ("forces.viscous_stress", "true")];
     let e = again(&bytes, &a).unwrap_err().to_string();
     assert!(e.contains("need the pressure gradient"), "{e}");
+    let e = again(&bytes, &[("forces.history", "true")]).unwrap_err().to_string();
+    assert!(e.contains("need the memory"), "{e}");
     let o = again(&bytes, &[]).unwrap();
     assert!(o.exchanges == 2 && o.comparison.identical());
 }
@@ -318,7 +320,7 @@ fn a_scene_is_measured_on_a_recording() {
     assert!(p.relative > 0.2 * 35.0 / weight && p.relative < 1.01 * 50.0 / weight, "{p:?}");
     assert_eq!(decide::choose(term("Archimedes"), 1e-5), decide::Choice::On);
     assert_eq!(decide::choose(term("Archimedes"), 1e-1), decide::Choice::Off);
-    assert_eq!(decide::choose(term("history (Basset)"), 1e-9), decide::Choice::Missing);
+    assert_eq!(decide::choose(term("history (Basset)"), 1e-9), decide::Choice::On);
     assert!(decide::advice(&s, 1e-5).iter().any(|a| a.contains("forces.lift = \"loth\"")));
 }
 
@@ -365,7 +367,7 @@ fn the_forecast_bounds_the_size() {
         record(&s.0, &c, 9, [1, 1], Compression::None);
         let size = s.bytes().len() as f64;
         let mut f = forecast::of(&c, 500, 250);
-        // the made DEM sends its last interval always, and neither type nor spin
+        // the made DEM sends its last interval always
         if !set.iter().any(|s| s.1.contains("adaptive")) {
             f.total += f.exchanges * 500 * 8 * 10;
         }

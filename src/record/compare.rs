@@ -134,8 +134,8 @@ pub fn name(array: u32) -> (&'static str, &'static str, &'static str) {
         field::CHARGED => ("DRIVE", "charged_impulse", "N s"),
         field::ADDED_MASS => ("DRIVE", "added_mass", "kg"),
         field::ROTATION_COEFFICIENT => ("DRIVE", "rotation_coefficient", "N m s"),
-        field::ROTATION_RATE => ("DRIVE", "rotation_rate", "rad/s"),
-        field::MEMORY => ("DRIVE", "memory", ""),
+        field::ROTATION_RATE => ("DRIVE", "rotation_rate", "1/s"),
+        field::MEMORY => ("DRIVE", "history_memory", ""),
         _ => ("", "?", ""),
     }
 }

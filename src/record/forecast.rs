@@ -35,8 +35,21 @@ fn count(s: &Selection) -> (u64, u64) {
 pub fn of(c: &Config, particles: u64, cells: u64) -> Forecast {
     let told = setup::welcome(c, None).settings;
     let on = |key: &str| u64::from(told.get(key).is_some_and(|v| *v > 0.0));
-    // id, type, x, v, r, m, ω, impulse, ledger; K, u, f, charged back
-    let particle = 8 * (1 + 1 + 3 + 3 + 1 + 1 + 3 + 3 + 3 + 10 * on("send.history") + 1 + 3 + 3 + 3);
+    let memory = told.get("drive.memory").map_or(0, |w| *w as u64);
+    // id, x, v, r, m, impulse, ledger, and what is asked for
+    let sent = 1
+        + 3
+        + 3
+        + 1
+        + 1
+        + 3
+        + 3
+        + 10 * on("send.history")
+        + on("send.type")
+        + 3 * on("send.angular_velocity");
+    // K, u, f, charged, and the rest
+    let back = 1 + 3 + 3 + 3 + on("drive.added_mass") + 4 * on("drive.rotation");
+    let particle = 8 * (sent + back + 2 * memory);
     // U and what is sent beside; ε, ε old, Sp, Su, ε_s U_s back
     let cell = 8
         * (3 + 3 * on("send.pressure_gradient")
@@ -46,9 +59,10 @@ pub fn of(c: &Config, particles: u64, cells: u64) -> Forecast {
     let (exchanges, states) = count(&Selection::of(c));
     let exchange = particles * particle + cells * cell + 1000;
     let state = 8 * 7 * cells;
-    // a mesh of hexahedra: 3 faces of 4 corners and a point per cell
-    let mesh = cells * 8 * (3 + 3 * (4 + 1 + 2) + 1);
-    Forecast { exchanges, exchange, state, total: mesh + exchanges * exchange + states * state }
+    // hexahedra: 3 faces of 4 corners and a point per cell are 25 words; walls add to small meshes, other cells have more
+    let mesh = cells * 8 * 40 + 10_000;
+    let rows = 250 * (c.steps() + 1);
+    Forecast { exchanges, exchange, state, total: mesh + rows + exchanges * exchange + states * state }
 }
 
 /// Of a case, as far as its files tell; the error says what they do not.

@@ -116,7 +116,7 @@ impl Messages {
     /// The reply to the DEM, particles as in `p`; empty arrays if there is none, or a part of it is missing.
     pub fn drive(&self, p: &Particles) -> Result<Drive, RecordError> {
         let mut a = self.particle_arrays(p)?;
-        if a.len() < DRIVE.len() {
+        if DRIVE[..DRIVE_ALWAYS].iter().any(|d| !a.contains_key(&d.0)) {
             return Ok(Drive::default());
         }
         let drag_coefficient = a.remove(&field::DRAG_COEFFICIENT).unwrap_or_default();
@@ -141,6 +141,8 @@ pub const DRIVE: [(u32, usize); 8] = [
     (field::ROTATION_RATE, 3),
     (field::MEMORY, Memory::WIDTH),
 ];
+/// How many of them are always there.
+const DRIVE_ALWAYS: usize = 4;
 
 fn vectors(flat: Vec<f64>) -> Vec<[f64; 3]> {
     flat.chunks_exact(3).map(|v| [v[0], v[1], v[2]]).collect()

@@ -257,8 +257,10 @@ pub fn case<R: Read + Seek>(
 fn missing(config: &Config, told: &BTreeMap<String, f64>) -> Result<(), ReplayError> {
     for (key, value) in setup::welcome(config, None).settings {
         let then = told.get(&key).copied().unwrap_or(0.0);
-        if key.starts_with("send.") && value > then {
-            let what = key.trim_start_matches("send.").replace('_', " ");
+        // the memory of the history force goes to the DEM and comes back
+        let asked = key.starts_with("send.") || key == "drive.memory";
+        if asked && value > then {
+            let what = key.split('.').next_back().unwrap_or_default().replace('_', " ");
             return Err(ReplayError::Run(format!(
                 "these settings need the {what}, which the recorded programs did not send ({key} = 0): record the case with them"
             )));
