@@ -42,6 +42,14 @@ void FixVoidage::open()
   added_ = setting("dem.added_mass");
   constant_force_ = setting("dem.constant_force") != 0.0;
   history_ = setting("send.history") != 0.0;
+  types_ = setting("send.type") != 0.0;
+  spins_ = setting("send.angular_velocity") != 0.0;
+  added_sent_ = setting("drive.added_mass") != 0.0;
+  rotation_ = setting("drive.rotation") != 0.0;
+  const int wanted = (int)setting("drive.memory");
+  if (wanted != memory_ && setting("coupling.resumed") != 0.0)
+    stop("the restart file was written with other forces: forces.history must be as it was");
+  widen(wanted);
   check_settings();
 }
 
@@ -55,28 +63,38 @@ void FixVoidage::exchange()
 void FixVoidage::send(bool settle)
 {
   const uint64_t n = atom->nlocal;
-  const voidage_block blocks[] = {
-    {VOIDAGE_ID, VOIDAGE_I64, n}, {VOIDAGE_TYPE, VOIDAGE_I64, n}, {VOIDAGE_POSITION, VOIDAGE_F64, 3 * n},
+  voidage_block blocks[15] = {
+    {VOIDAGE_ID, VOIDAGE_I64, n}, {VOIDAGE_POSITION, VOIDAGE_F64, 3 * n},
     {VOIDAGE_VELOCITY, VOIDAGE_F64, 3 * n}, {VOIDAGE_RADIUS, VOIDAGE_F64, n}, {VOIDAGE_MASS, VOIDAGE_F64, n},
-    {VOIDAGE_ANGULAR_VELOCITY, VOIDAGE_F64, 3 * n}, {VOIDAGE_IMPULSE, VOIDAGE_F64, 3 * n},
-    {VOIDAGE_LEDGER, VOIDAGE_F64, 3 * n}, {VOIDAGE_TOTALS, VOIDAGE_F64, 9},
+    {VOIDAGE_IMPULSE, VOIDAGE_F64, 3 * n}, {VOIDAGE_LEDGER, VOIDAGE_F64, 3 * n}, {VOIDAGE_TOTALS, VOIDAGE_F64, 9}};
+  size_t count = 8;
+  const voidage_block more[] = {
     {VOIDAGE_LAST_DRAG_COEFFICIENT, VOIDAGE_F64, n}, {VOIDAGE_LAST_DRIVE_VELOCITY, VOIDAGE_F64, 3 * n},
-    {VOIDAGE_LAST_FORCE, VOIDAGE_F64, 3 * n}, {VOIDAGE_LAST_VELOCITY, VOIDAGE_F64, 3 * n}};
-  const size_t count = sizeof blocks / sizeof *blocks - (history_ ? 0 : 4);
+    {VOIDAGE_LAST_FORCE, VOIDAGE_F64, 3 * n}, {VOIDAGE_LAST_VELOCITY, VOIDAGE_F64, 3 * n},
+    {VOIDAGE_TYPE, VOIDAGE_I64, n}, {VOIDAGE_ANGULAR_VELOCITY, VOIDAGE_F64, 3 * n},
+    {VOIDAGE_LAST_MEMORY, VOIDAGE_F64, memory_ * n}};
+  for (int k = 0; history_ && k < 4; k++) blocks[count++] = more[k];
+  if (types_) blocks[count++] = more[4];
+  if (spins_) blocks[count++] = more[5];
+  if (memory_) blocks[count++] = more[6];
   if (voidage_begin(link_, VOIDAGE_PARTICLES, exchange_, update->ntimestep * update->dt, blocks, count))
     stop(voidage_last_error());
-  int64_t *id = (int64_t *)voidage_array(link_, VOIDAGE_ID), *type = (int64_t *)voidage_array(link_, VOIDAGE_TYPE);
+  int64_t *id = (int64_t *)voidage_array(link_, VOIDAGE_ID);
+  int64_t *type = types_ ? (int64_t *)voidage_array(link_, VOIDAGE_TYPE) : NULL;
   double *x = (double *)voidage_array(link_, VOIDAGE_POSITION), *v = (double *)voidage_array(link_, VOIDAGE_VELOCITY);
   double *r = (double *)voidage_array(link_, VOIDAGE_RADIUS), *m = (double *)voidage_array(link_, VOIDAGE_MASS);
-  double *w = (double *)voidage_array(link_, VOIDAGE_ANGULAR_VELOCITY);
+  double *w = spins_ ? (double *)voidage_array(link_, VOIDAGE_ANGULAR_VELOCITY) : NULL;
+  double *memory = memory_ ? (double *)voidage_array(link_, VOIDAGE_LAST_MEMORY) : NULL;
   double *taken = (double *)voidage_array(link_, VOIDAGE_IMPULSE);
   double *ledger = (double *)voidage_array(link_, VOIDAGE_LEDGER);
   double *totals = (double *)voidage_array(link_, VOIDAGE_TOTALS);
-  if (!id || !type || !x || !v || !r || !m || !w || !taken || !ledger || !totals) stop(voidage_last_error());
+  if (!id || !x || !v || !r || !m || !taken || !ledger || !totals || (types_ && !type) || (spins_ && !w) ||
+      (memory_ && !memory)) stop(voidage_last_error());
   for (uint64_t i = 0; i < n; i++) {
     double *a = a_[i];
     id[i] = atom->tag[i];
-    type[i] = atom->type[i];
+    if (type) type[i] = atom->type[i];
+    if (memory) memcpy(memory + memory_ * i, a + COLUMNS, memory_ * sizeof(double));
     r[i] = atom->radius[i];
     m[i] = atom->rmass[i];
     for (int k = 0; k < 3; k++) {
@@ -84,7 +102,7 @@ void FixVoidage::send(bool settle)
       if (settle) a[LEDGER + k] = a[TAKEN + k] - a[CHARGED + k];
       x[3 * i + k] = atom->x[i][k];
       v[3 * i + k] = atom->v[i][k];
-      w[3 * i + k] = atom->omega[i][k];
+      if (w) w[3 * i + k] = atom->omega[i][k];
       taken[3 * i + k] = a[TAKEN + k];
       ledger[3 * i + k] = a[LEDGER + k];
       a[TAKEN + k] = 0.0;
@@ -115,6 +133,16 @@ void FixVoidage::send_history()
   }
 }
 
+// An array of the drive that was agreed on.
+const double *FixVoidage::driven(unsigned name, uint64_t count)
+{
+  uint64_t n = 0;
+  const double *list = (const double *)voidage_read(link_, name, &n);
+  if (!list) stop(voidage_last_error());
+  if (n != count) stop("the coupler answered for other particles or another exchange");
+  return list;
+}
+
 void FixVoidage::receive()
 {
   const int kind = voidage_receive(link_);
@@ -140,11 +168,19 @@ void FixVoidage::receive()
   if (!kc || !u || !f || !c) stop(voidage_last_error());
   if (nk != n || nu != 3 * n || nf != 3 * n || nc != 3 * n || voidage_step(link_) != exchange_)
     stop("the coupler answered for other particles or another exchange");
+  const double *added = added_sent_ ? driven(VOIDAGE_ADDED_MASS, n) : NULL;
+  const double *kw = rotation_ ? driven(VOIDAGE_ROTATION_COEFFICIENT, n) : NULL;
+  const double *spin = rotation_ ? driven(VOIDAGE_ROTATION_RATE, 3 * n) : NULL;
+  const double *memory = memory_ ? driven(VOIDAGE_MEMORY, memory_ * n) : NULL;
   for (int k = 0; k < 9; k++) totals_[k] = 0.0;
   for (uint64_t i = 0; i < n; i++) {
     double *a = a_[i];
     a[K] = kc[i];
+    if (added) a[ADDED] = added[i];
+    if (kw) a[SPIN_K] = kw[i];
+    if (memory) memcpy(a + COLUMNS, memory + memory_ * i, memory_ * sizeof(double));
     for (int k = 0; k < 3; k++) {
+      if (spin) a[SPIN + k] = spin[3 * i + k];
       a[U + k] = u[3 * i + k];
       a[F + k] = f[3 * i + k];
       a[CHARGED + k] = c[3 * i + k];

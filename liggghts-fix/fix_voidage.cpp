@@ -27,9 +27,9 @@ using namespace FixConst;
 namespace LAMMPS_NS { namespace SignalHandler { extern bool request_quit; } }
 
 FixVoidage::FixVoidage(LAMMPS *lmp, int narg, char **arg)
-  : Fix(lmp, narg, arg), link_(NULL), a_(NULL), first_step_(-1), exchange_(0), restored_(-1),
-    last_(false), interval_(1), explicit_limit_(0.2), added_(0.0), history_(false),
-    constant_force_(false), ended_(false), quit_(false), integrated_(0), frozen_(0)
+  : Fix(lmp, narg, arg), link_(NULL), a_(NULL), width_(COLUMNS), memory_(0), rows_(0), first_step_(-1), exchange_(0),
+    restored_(-1), last_(false), interval_(1), explicit_limit_(0.2), added_(0.0), history_(false), types_(false),
+    spins_(false), added_sent_(false), rotation_(false), constant_force_(false), ended_(false), quit_(false), integrated_(0), frozen_(0)
 {
   check_host();
   if (narg != 3 || strcmp(arg[1], "all") != 0)
@@ -104,18 +104,24 @@ void FixVoidage::setup(int vflag)
     if (constant_force_) memcpy(fd, &a_[i][FORCE], sizeof fd);
     else fluid_force(i, 0.5 * update->dt, fd);
     for (int k = 0; k < 3; k++) f[i][k] += a_[i][FORCE + k] = fd[k];
+    if (!rotation_) continue;
+    fluid_torque(i, 0.5 * update->dt, fd);
+    for (int k = 0; k < 3; k++) atom->torque[i][k] += a_[i][TORQUE + k] = fd[k];
   }
 }
+
+bool FixVoidage::moves(int i) const { return (atom->mask[i] & integrated_) && !(atom->mask[i] & frozen_); }
 
 // Force of the fluid for a kick of duration h (s) from the present v; f holds all other forces.
 void FixVoidage::fluid_force(int i, double h, double *fd) const
 {
   const double *a = a_[i], *v = atom->v[i], *f = atom->f[i];
-  const bool moves = (atom->mask[i] & integrated_) && !(atom->mask[i] & frozen_);
+  const bool free = moves(i);
   const double r = atom->radius[i], m = atom->rmass[i], kc = a[K];
   // (m + ma) dv/dt = all other forces, so light particles are stable
-  const double ma = moves ? added_ * 4.0 / 3.0 * M_PI * r * r * r : 0.0, x = kc * update->dt / (m + ma);
-  if (x <= explicit_limit_ || !moves || constant_force_) {
+  const double added = added_sent_ ? a[ADDED] : added_ * 4.0 / 3.0 * M_PI * r * r * r;
+  const double ma = free ? added : 0.0, x = kc * update->dt / (m + ma);
+  if (x <= explicit_limit_ || !free || constant_force_) {
     for (int k = 0; k < 3; k++) {
       fd[k] = kc * (a[U + k] - v[k]) + a[F + k];
       if (ma > 0.0) fd[k] = m / (m + ma) * (f[k] + fd[k]) - f[k];
@@ -128,6 +134,19 @@ void FixVoidage::fluid_force(int i, double h, double *fd) const
     const double other = f[k] + a[F + k];
     fd[k] = rate * (a[U + k] + other / kc - v[k]) - f[k];
   }
+}
+
+// Torque of the fluid for a kick of duration h (s) from the present w; torque holds all others. As the force.
+void FixVoidage::fluid_torque(int i, double h, double *td) const
+{
+  const double *a = a_[i], *w = atom->omega[i], *torque = atom->torque[i];
+  const double r = atom->radius[i], inertia = 0.4 * atom->rmass[i] * r * r, kw = a[SPIN_K];
+  if (kw * update->dt / inertia <= explicit_limit_ || !moves(i)) {
+    for (int k = 0; k < 3; k++) td[k] = kw * (a[SPIN + k] - w[k]);
+    return;
+  }
+  const double rate = -inertia / h * expm1(-kw * h / inertia);
+  for (int k = 0; k < 3; k++) td[k] = rate * (a[SPIN + k] + torque[k] / kw - w[k]) - torque[k];
 }
 
 void FixVoidage::post_force(int vflag)
@@ -147,6 +166,9 @@ void FixVoidage::post_force(int vflag)
       a_[i][FORCE + k] = fd[k];
       f[i][k] += fd[k];
     }
+    if (!rotation_) continue;
+    fluid_torque(i, update->dt, fd);
+    for (int k = 0; k < 3; k++) atom->torque[i][k] += a_[i][TORQUE + k] = fd[k];
   }
 }
 
@@ -162,6 +184,10 @@ void FixVoidage::end_of_step()
     for (int k = 0; k < 3; k++) f[i][k] -= a_[i][FORCE + k];
     fluid_force(i, 0.5 * update->dt, fd);
     for (int k = 0; k < 3; k++) f[i][k] += a_[i][FORCE + k] = fd[k];
+    if (!rotation_) continue;
+    for (int k = 0; k < 3; k++) atom->torque[i][k] -= a_[i][TORQUE + k];
+    fluid_torque(i, 0.5 * update->dt, fd);
+    for (int k = 0; k < 3; k++) atom->torque[i][k] += a_[i][TORQUE + k] = fd[k];
   }
   save();
 }
@@ -183,23 +209,44 @@ double FixVoidage::compute_vector(int n)
   return all;
 }
 
-double FixVoidage::memory_usage() { return (double)atom->nmax * COLUMNS * sizeof(double); }
+double FixVoidage::memory_usage() { return (double)rows_ * width_ * sizeof(double); }
 
-void FixVoidage::grow_arrays(int nmax) { memory->grow(a_, nmax, (int)COLUMNS, "voidage:per_atom"); }
+void FixVoidage::grow_arrays(int nmax)
+{
+  memory->grow(a_, nmax, width_, "voidage:per_atom");
+  rows_ = nmax;
+}
 
-void FixVoidage::copy_arrays(int i, int j, int) { memcpy(a_[j], a_[i], COLUMNS * sizeof(double)); }
+// Another number of columns for the coupler's memory; what stands in the others stays.
+void FixVoidage::widen(int wanted)
+{
+  if (wanted == memory_) return;
+  const int width = COLUMNS + wanted;
+  double **wide = NULL;
+  memory->create(wide, rows_, width, "voidage:per_atom");
+  for (int i = 0; i < atom->nlocal; i++) {
+    memset(wide[i], 0, width * sizeof(double));
+    memcpy(wide[i], a_[i], COLUMNS * sizeof(double));
+  }
+  memory->destroy(a_);
+  a_ = wide;
+  width_ = width;
+  memory_ = wanted;
+}
+
+void FixVoidage::copy_arrays(int i, int j, int) { memcpy(a_[j], a_[i], width_ * sizeof(double)); }
 
 // A particle inserted feels no fluid until the next exchange.
-void FixVoidage::set_arrays(int i) { memset(a_[i], 0, COLUMNS * sizeof(double)); }
+void FixVoidage::set_arrays(int i) { memset(a_[i], 0, width_ * sizeof(double)); }
 
 int FixVoidage::pack_exchange(int i, double *buf)
 {
-  memcpy(buf, a_[i], COLUMNS * sizeof(double));
-  return COLUMNS;
+  memcpy(buf, a_[i], width_ * sizeof(double));
+  return width_;
 }
 
 int FixVoidage::unpack_exchange(int i, double *buf)
 {
-  memcpy(a_[i], buf, COLUMNS * sizeof(double));
-  return COLUMNS;
+  memcpy(a_[i], buf, width_ * sizeof(double));
+  return width_;
 }

@@ -20,28 +20,29 @@
 
 using namespace LAMMPS_NS;
 
-// State of the fix: width of the table, number of the last exchange.
+// State of the fix: columns of the table, number of the last exchange, columns of the coupler's memory.
 void FixVoidage::write_restart(FILE *fp)
 {
-  double list[2] = {(double)COLUMNS, (double)exchange_};
+  double list[3] = {(double)COLUMNS, (double)exchange_, (double)memory_};
   if (comm->me != 0) return;
   const int size = sizeof list;
   fwrite(&size, sizeof(int), 1, fp);
-  fwrite(list, sizeof(double), 2, fp);
+  fwrite(list, sizeof(double), 3, fp);
 }
 
 void FixVoidage::restart(char *buf)
 {
-  double list[2];
+  double list[3];
   memcpy(list, buf, sizeof list);
   if ((int)list[0] != (int)COLUMNS)
     error->all(FLERR, "fix voidage: the restart file comes from another version of the fix; start the run anew");
   restored_ = (bigint)list[1];
+  widen((int)list[2]);
 }
 
-int FixVoidage::maxsize_restart() { return 1 + COLUMNS; }
+int FixVoidage::maxsize_restart() { return 1 + width_; }
 
-int FixVoidage::size_restart(int) { return 1 + COLUMNS; }
+int FixVoidage::size_restart(int) { return 1 + width_; }
 
 int FixVoidage::pack_restart(int i, double *buf)
 {
@@ -49,9 +50,9 @@ int FixVoidage::pack_restart(int i, double *buf)
     a_[i][HELD + k] = atom->f[i][k];
     a_[i][HELD + 3 + k] = atom->torque[i][k];
   }
-  buf[0] = 1 + COLUMNS;
-  memcpy(buf + 1, a_[i], COLUMNS * sizeof(double));
-  return 1 + COLUMNS;
+  buf[0] = 1 + width_;
+  memcpy(buf + 1, a_[i], width_ * sizeof(double));
+  return 1 + width_;
 }
 
 void FixVoidage::unpack_restart(int i, int nth)
@@ -59,7 +60,7 @@ void FixVoidage::unpack_restart(int i, int nth)
   const double *extra = atom->extra[i];
   int m = 0;
   for (int k = 0; k < nth; k++) m += (int)extra[m];
-  memcpy(a_[i], extra + m + 1, COLUMNS * sizeof(double));
+  memcpy(a_[i], extra + m + 1, width_ * sizeof(double));
 }
 
 // The first `run` of a restarted run: takes up exchange `first`, in which this table was filled.

@@ -2,14 +2,18 @@
 //! The commands of the program: from arguments to an exit code. What is printed for people is printed here.
 #![allow(clippy::print_stderr, clippy::print_stdout)]
 
+pub mod export;
+pub mod inspect;
+pub mod record;
+
 use crate::config::{self, CaseFile, Config, Problem, Severity};
 use crate::couple::{Exchange, receive_mesh};
 use crate::launch::{self, Outcome};
 use crate::monitor::{self, Monitor};
 use crate::output::restart::{Sets, State};
 use crate::partners::Partners;
+use crate::record::{Recorded, Recorder};
 use crate::setup;
-use crate::step::CouplingStep;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -58,8 +62,10 @@ pub fn check(case: &Path, set: &[String]) -> u8 {
     };
     let problems = config::check(&config);
     print(&problems);
-    let errors = problems.iter().filter(|p| p.severity == Severity::Error).count();
-    println!("{}: {errors} errors, {} warnings", case.display(), problems.len() - errors);
+    record::forecast(&config);
+    let count = |s: Severity| problems.iter().filter(|p| p.severity == s).count();
+    let errors = count(Severity::Error);
+    println!("{}: {errors} errors, {} warnings", case.display(), count(Severity::Warning));
     if errors == 0 { OK } else { BAD_INPUT }
 }
 
@@ -85,7 +91,9 @@ pub fn run(case: &Path, into: Option<&Path>, set: &[String], restart: Option<Opt
     if let Some(r) = &restart {
         config.control.start = r.state.origin;
     }
-    let problems = config::check(&config);
+    let mut problems = config::check(&config);
+    // numbers to judge by are for `check`
+    problems.retain(|p| p.severity != Severity::Note);
     print(&problems);
     if problems.iter().any(|p| p.severity == Severity::Error) {
         return BAD_INPUT;
@@ -103,6 +111,10 @@ pub fn run(case: &Path, into: Option<&Path>, set: &[String], restart: Option<Opt
             }
         }
     };
+    if let Err(p) = record::before(&config, restart.as_ref().map(|r| r.state.time)) {
+        print(&[p]);
+        return BAD_INPUT;
+    }
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         if let Err(e) = signal_hook::flag::register(signal, Arc::clone(&stop)) {
@@ -165,21 +177,29 @@ fn coupled(case: &Path, resolved: bool, restart: Option<&Path>) -> Result<(), St
     let dem = serve(Role::Dem, session.dem_ranks).map_err(|e| e.to_string())?;
     let cfd = serve(Role::Cfd, session.cfd_ranks).map_err(|e| e.to_string())?;
     session.announce().map_err(|e| e.to_string())?;
+    let recorder = record::start(&config, &session, resume.as_ref())?;
+    let mut number = 0..;
+    let mut recorded = |list: Vec<voidage_shm::Channel>| {
+        list.into_iter().zip(&mut number).map(|(c, i)| Recorded::new(c, i, recorder.clone())).collect()
+    };
+    let (dem, cfd) = (recorded(dem), recorded(cfd));
     let mut partners = Partners::new(dem, cfd, Duration::from_secs_f64(session.wait));
-    let result = exchange(&config, &session, &mut partners, resume);
+    let result = exchange(&config, &session, &mut partners, resume, recorder.clone());
     if let Err(e) = &result {
         partners.stop(e);
         // last words must be read before the segments go
         std::thread::sleep(Duration::from_millis(200));
     }
+    record::finish(recorder.as_ref(), &result)?;
     result
 }
 
 fn exchange(
     config: &Config,
     session: &Session,
-    partners: &mut Partners<voidage_shm::Channel>,
+    partners: &mut Partners<Recorded<voidage_shm::Channel>>,
     resume: Option<State>,
+    recorder: Option<Recorder>,
 ) -> Result<(), String> {
     let start_limit = Duration::from_secs_f64(session.start);
     partners.belongs_to(session.launcher);
@@ -191,10 +211,8 @@ fn exchange(
     }
     let mesh = receive_mesh(partners).map_err(|e| e.to_string())?;
     println!("mesh: {} cells of {} ranks", mesh.len(), session.cfd_ranks);
-    let [smoother, positive] = setup::smoothers(config, &mesh)?;
-    println!("smoothing: {}, {} sweeps", smoother.name(), smoother.degree());
-    let mapping = setup::mapping(config, &mesh)?;
-    let step = CouplingStep::new(mesh, setup::setup(config)?, mapping, smoother, positive);
+    let step = setup::step(config, mesh)?;
+    println!("smoothing: {}, {} sweeps", step.smoother().name(), step.smoother().degree());
     let file = config.folder.join("monitor.csv");
     let monitor = match &resume {
         None => Monitor::create(&file, false),
@@ -227,6 +245,7 @@ fn exchange(
     let mut run = Exchange {
         partners: Partners::new(Vec::new(), Vec::new(), Duration::ZERO),
         step,
+        pool: setup::pool(config)?,
         two_way: config.file.coupling.feedback == config::Feedback::TwoWay,
         period: config.period(),
         start: config.control.start,
@@ -234,7 +253,8 @@ fn exchange(
         interval,
         resume,
         sets: Sets::new(config),
-        monitor,
+        monitor: Some(monitor),
+        recorder,
         progress: &mut progress,
         write: &mut write,
     };
@@ -281,7 +301,7 @@ pub fn explain(topic: &str) -> u8 {
 }
 
 /// `voidage bench`
-pub fn bench(json: Option<&Path>, quick: bool) -> u8 {
+pub fn bench(json: Option<&Path>, plot: Option<&Path>, quick: bool) -> u8 {
     let report = match crate::bench::report::run(quick, |what| eprintln!("{what}")) {
         Ok(r) => r,
         Err(e) => {
@@ -290,20 +310,26 @@ pub fn bench(json: Option<&Path>, quick: bool) -> u8 {
         }
     };
     println!("{}", report.table());
-    let Some(file) = json else { return OK };
-    let text = serde_json::to_string_pretty(&report).map_err(|e| e.to_string());
-    match text.and_then(|t| std::fs::write(file, t + "\n").map_err(|e| e.to_string())) {
-        Ok(()) => OK,
+    let write = |option: &str, file: &Path, text: String| {
+        let done = std::fs::write(file, text);
+        done.map_err(|e| eprintln!("error: {option} {}: {e}", file.display())).is_ok()
+    };
+    let text = match serde_json::to_string_pretty(&report) {
+        Ok(t) => t + "\n",
         Err(e) => {
-            eprintln!("error: --json {}: {e}", file.display());
-            FAILED
+            eprintln!("error: --json: {e}");
+            return FAILED;
         }
-    }
+    };
+    let written = json.is_none_or(|file| write("--json", file, text))
+        & plot.is_none_or(|file| write("--plot", file, report.plot()));
+    if written { OK } else { FAILED }
 }
 
 /// `voidage version`
 pub fn version() -> u8 {
-    println!("voidage {}, wire protocol {PROTOCOL}", env!("CARGO_PKG_VERSION"));
+    let recording = crate::record::FORMAT;
+    println!("voidage {}, wire protocol {PROTOCOL}, recording format {recording}", env!("CARGO_PKG_VERSION"));
     for package in ["openfoam", "liggghts", "lammps"] {
         let out = std::process::Command::new("dpkg-query").args(["-W", "-f", "${Version}", package]).output();
         let found =

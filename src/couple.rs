@@ -6,11 +6,13 @@
 //! (generic over `Transport`), nor how a stage works.
 
 use crate::balance::Books;
+use crate::forces::history::Memory;
 use crate::mesh::{self, Mesh, MeshPiece};
 use crate::monitor::{Monitor, Row};
 use crate::output::restart::{self, Sets, State};
 use crate::particles::{ParticleError, Particles};
 use crate::partners::{PartnerError, Partners};
+use crate::record::{RecordError, Recorder};
 use crate::step::{CouplingStep, Fluid, StepError};
 use crate::sums::norm;
 use serde::{Deserialize, Serialize};
@@ -51,6 +53,9 @@ pub enum CoupleError {
     /// Partners disagree.
     #[error("{0}")]
     OutOfStep(String),
+    /// The recording.
+    #[error(transparent)]
+    Record(#[from] RecordError),
     /// A file.
     #[error("{what}: {source}")]
     File {
@@ -87,6 +92,23 @@ pub fn receive_mesh<T: Transport>(partners: &mut Partners<T>) -> Result<Mesh, Co
     Ok(mesh::assemble(&pieces)?)
 }
 
+/// Puts the fluid of one CFD rank, whose cells have these slots, among that of all `n` cells.
+pub fn take_fluid(frame: &Frame, slots: &[u32], n: usize, fluid: &mut Fluid) -> Result<(), WireError> {
+    for (name, to) in [
+        (field::FLUID_VELOCITY, &mut fluid.velocity),
+        (field::PRESSURE_GRADIENT, &mut fluid.pressure_gradient),
+        (field::STRESS_DIVERGENCE, &mut fluid.stress_divergence),
+    ] {
+        if name != field::FLUID_VELOCITY && frame.raw(name).is_none() {
+            continue;
+        }
+        to.resize(n, [0.0; 3]);
+        let values = frame.vectors_of(name, slots.len())?;
+        slots.iter().zip(values).for_each(|(slot, v)| to[*slot as usize] = *v);
+    }
+    Ok(())
+}
+
 /// What a write time hands to the output.
 pub struct Snapshot<'a> {
     /// exchange number
@@ -107,6 +129,8 @@ pub struct Exchange<'a, T: Transport> {
     pub partners: Partners<T>,
     /// The stages.
     pub step: CouplingStep,
+    /// Threads the stages run on; `None`: on the calling one.
+    pub pool: Option<rayon::ThreadPool>,
     /// False: the fluid does not feel the particles.
     pub two_way: bool,
     /// Δt, s.
@@ -121,12 +145,25 @@ pub struct Exchange<'a, T: Transport> {
     pub resume: Option<State>,
     /// Writes restart sets at the fluid's write times.
     pub sets: Option<Sets>,
-    /// monitor.csv
-    pub monitor: Monitor,
+    /// monitor.csv; `None` in a replay
+    pub monitor: Option<Monitor>,
+    /// Keeps the exchanges; what it misses of them passes its transport.
+    pub recorder: Option<Recorder>,
     /// Told after each exchange.
     pub progress: &'a mut dyn FnMut(&Row, &Summary),
     /// Told at the fluid's write times.
     pub write: &'a mut dyn FnMut(&Snapshot) -> std::io::Result<()>,
+}
+
+/// What goes from one exchange to the next beside the step's own.
+#[derive(Default)]
+pub struct Course {
+    fluid: Fluid,
+    open: Option<Open>,
+    /// ledger of vanished particles, N s
+    left: [f64; 3],
+    /// so far
+    pub summary: Summary,
 }
 
 /// A row that waits for the DEM's report on the interval it is about.
@@ -146,84 +183,108 @@ impl<T: Transport> Exchange<'_, T> {
     }
 
     fn exchanges(&mut self) -> Result<Summary, CoupleError> {
-        let mut summary = Summary::default();
-        let mut fluid = Fluid::default();
-        let mut open: Option<Open> = None;
-        let mut left = [0.0; 3];
-        let mut from = 0;
+        let mut course = Course::default();
+        let mut k = 0;
         if let Some(s) = self.resume.take() {
-            from = s.exchange + 1;
-            (left, summary) = (s.left, s.summary);
-            open = Some(self.take_up(&s)?);
+            k = s.exchange + 1;
+            (course.left, course.summary) = (s.left, s.summary);
+            course.open = Some(self.take_up(&s)?);
         }
-        for k in from.. {
-            let begin = Instant::now();
-            let time = self.start + k as f64 * self.period;
-            let (first, mut wait_cfd, mut last, mut write) = (k == 0, Duration::ZERO, false, true);
-            let mut reaction = [0.0; 3];
-            if first {
-                (last, _, _) = self.receive_fluid(k, &mut fluid, &mut wait_cfd)?;
+        while !self.exchange(k, &mut course)? {
+            k += 1;
+        }
+        Ok(course.summary)
+    }
+
+    /// Exchange k. True: it was the last.
+    pub fn exchange(&mut self, k: i64, course: &mut Course) -> Result<bool, CoupleError> {
+        let begin = Instant::now();
+        let time = self.start + k as f64 * self.period;
+        if let Some(r) = &self.recorder {
+            r.begin(k, time, &self.step)?;
+        }
+        let (first, mut wait_cfd, mut last, mut write) = (k == 0, Duration::ZERO, false, true);
+        let mut reaction = [0.0; 3];
+        if first {
+            (last, _, _) = self.receive_fluid(k, &mut course.fluid, &mut wait_cfd)?;
+        }
+        let waiting = Instant::now();
+        let mut particles = self.receive_particles(k)?;
+        let wait_dem = waiting.elapsed();
+        if let Some(o) = course.open.take() {
+            self.close(o, Some(&particles), course)?;
+        }
+        let stage = |source| CoupleError::Step { step: k, source };
+        let step = &mut self.step;
+        match &self.pool {
+            Some(pool) => pool.install(|| step.before_fluid(&mut particles, first)),
+            None => step.before_fluid(&mut particles, first),
+        }
+        .map_err(stage)?;
+        self.send_sources(k, time)?;
+        if !first {
+            (last, write, reaction) = self.receive_fluid(k, &mut course.fluid, &mut wait_cfd)?;
+        }
+        let (step, fluid) = (&mut self.step, &course.fluid);
+        match &self.pool {
+            Some(pool) => pool.install(|| step.after_fluid(&particles, fluid, first)),
+            None => step.after_fluid(&particles, fluid, first),
+        }
+        .map_err(stage)?;
+        self.step.books.reaction = reaction;
+        let file = |source| CoupleError::File { what: "restart set", source };
+        let set = match &self.sets {
+            Some(sets) if write && !first => Some(sets.begin(time).map_err(file)?),
+            _ => None,
+        };
+        if last {
+            self.partners.release_cfd();
+        }
+        if last && set.is_none() {
+            self.partners.stop("");
+        } else {
+            self.send_drive(k, time, &particles, set.as_deref(), last)?;
+        }
+        if write {
+            self.step.form_solids_flux(&particles);
+            let fluid = &course.fluid;
+            let snapshot = Snapshot { k, time, particles: &particles, step: &self.step, fluid };
+            (self.write)(&snapshot).map_err(|source| CoupleError::File { what: "write fields", source })?;
+        }
+        let mut o = self.open_row(k, time, &particles, &mut course.summary);
+        o.row.wait_dem = wait_dem.as_secs_f64();
+        o.row.wait_cfd = wait_cfd.as_secs_f64();
+        o.row.coupler = begin.elapsed().as_secs_f64() - o.row.wait_dem - o.row.wait_cfd;
+        let summary = &mut course.summary;
+        summary.coupler += o.row.coupler;
+        summary.wait_dem += o.row.wait_dem;
+        summary.wait_cfd += o.row.wait_cfd;
+        summary.steps = k;
+        summary.time = time;
+        if let Some(set) = set {
+            for i in self.partners.dem() {
+                self.partners.receive(i, kind::WRITTEN, "word that its restart file is written")?;
             }
-            let waiting = Instant::now();
-            let mut particles = self.receive_particles(k)?;
-            let wait_dem = waiting.elapsed();
-            if let Some(o) = open.take() {
-                self.close(o, Some(&particles), &mut left, &mut summary)?;
-            }
-            let stage = |source| CoupleError::Step { step: k, source };
-            self.step.before_fluid(&mut particles, first).map_err(stage)?;
-            self.send_sources(k, time)?;
-            if !first {
-                (last, write, reaction) = self.receive_fluid(k, &mut fluid, &mut wait_cfd)?;
-            }
-            self.step.after_fluid(&particles, &fluid, first).map_err(stage)?;
-            self.step.books.reaction = reaction;
-            let file = |source| CoupleError::File { what: "restart set", source };
-            let set = match &self.sets {
-                Some(sets) if write && !first => Some(sets.begin(time).map_err(file)?),
-                _ => None,
-            };
             if last {
-                self.partners.release_cfd();
-            }
-            if last && set.is_none() {
                 self.partners.stop("");
-            } else {
-                self.send_drive(k, time, &particles, set.as_deref(), last)?;
             }
-            if write {
-                self.step.form_solids_flux(&particles);
-                let snapshot = Snapshot { k, time, particles: &particles, step: &self.step, fluid: &fluid };
-                (self.write)(&snapshot)
-                    .map_err(|source| CoupleError::File { what: "write fields", source })?;
-            }
-            let mut o = self.open_row(k, time, &particles, &mut summary);
-            o.row.wait_dem = wait_dem.as_secs_f64();
-            o.row.wait_cfd = wait_cfd.as_secs_f64();
-            o.row.coupler = begin.elapsed().as_secs_f64() - o.row.wait_dem - o.row.wait_cfd;
-            summary.coupler += o.row.coupler;
-            summary.wait_dem += o.row.wait_dem;
-            summary.wait_cfd += o.row.wait_cfd;
-            summary.steps = k;
-            summary.time = time;
-            if let Some(set) = set {
-                for i in self.partners.dem() {
-                    self.partners.receive(i, kind::WRITTEN, "word that its restart file is written")?;
-                }
-                if last {
-                    self.partners.stop("");
-                }
-                let state = self.state(k, &particles, &fluid, &o, left, &summary);
-                self.sets.iter().try_for_each(|s| s.finish(&set, state.clone())).map_err(file)?;
-            }
-            (self.progress)(&o.row, &summary);
-            if last {
-                self.close(o, None, &mut left, &mut summary)?;
-                return Ok(summary);
-            }
-            open = Some(o);
+            let state = self.state(k, &particles, &course.fluid, &o, course.left, &course.summary);
+            self.sets.iter().try_for_each(|s| s.finish(&set, state.clone())).map_err(file)?;
         }
-        Ok(summary)
+        (self.progress)(&o.row, &course.summary);
+        course.open = Some(o);
+        if last {
+            self.pause(course)?;
+        }
+        Ok(last)
+    }
+
+    /// No exchange follows that could complete the row at hand: the run is over, or the next one is not recorded.
+    pub fn pause(&mut self, course: &mut Course) -> Result<(), CoupleError> {
+        match course.open.take() {
+            Some(o) => self.close(o, None, course),
+            None => Ok(()),
+        }
     }
 
     /// The set of exchange k, as far as the exchanges know it.
@@ -290,7 +351,7 @@ impl<T: Transport> Exchange<'_, T> {
                 "the DEM brought other particles back ({was} were saved, {now} came, or their values changed after read_restart)"
             )));
         }
-        self.step.restore(&s.voidage, &s.velocity);
+        self.step.restore(&s.voidage, &s.velocity, &[]);
         self.send_sources(k, s.time)?;
         Ok(Open { row: s.row, books: s.books })
     }
@@ -332,19 +393,7 @@ impl<T: Transport> Exchange<'_, T> {
             *waited += begin.elapsed();
             let frame = Frame::parse(&sample)?;
             Self::in_step(frame.step(), k, &self.partners.who(i))?;
-            let slots = &self.step.mesh.slots[piece];
-            for (name, to) in [
-                (field::FLUID_VELOCITY, &mut fluid.velocity),
-                (field::PRESSURE_GRADIENT, &mut fluid.pressure_gradient),
-                (field::STRESS_DIVERGENCE, &mut fluid.stress_divergence),
-            ] {
-                if name != field::FLUID_VELOCITY && frame.raw(name).is_none() {
-                    continue;
-                }
-                to.resize(n, [0.0; 3]);
-                let values = frame.vectors_of(name, slots.len())?;
-                slots.iter().zip(values).for_each(|(slot, v)| to[*slot as usize] = *v);
-            }
+            take_fluid(&frame, &self.step.mesh.slots[piece], n, fluid)?;
             let (f, r) = (frame.f64s_of(field::FLAGS, 2)?, frame.f64s_of(field::REACTION, 3)?);
             flags = [f[0], f[1]];
             (0..3).for_each(|a| reaction[a] += r[a]);
@@ -399,23 +448,33 @@ impl<T: Transport> Exchange<'_, T> {
         let mut counts = vec![0; self.partners.dem().len()];
         particles.origin.iter().for_each(|o| counts[o.0 as usize] += 1);
         let drive = &self.step.drive;
+        let memory: Vec<f64> = drive.memory.iter().flat_map(|m| m.0).collect();
         for i in self.partners.dem() {
             let n = counts[i];
-            let vectors = [
-                (field::DRIVE_VELOCITY, &drive.velocity),
-                (field::FORCE, &drive.force),
-                (field::CHARGED, &drive.charged),
+            let arrays = [
+                (field::DRAG_COEFFICIENT, 1, &drive.drag_coefficient[..]),
+                (field::DRIVE_VELOCITY, 3, drive.velocity.as_flattened()),
+                (field::FORCE, 3, drive.force.as_flattened()),
+                (field::CHARGED, 3, drive.charged.as_flattened()),
+                (field::ADDED_MASS, 1, &drive.added_mass[..]),
+                (field::ROTATION_COEFFICIENT, 1, &drive.rotation_coefficient[..]),
+                (field::ROTATION_RATE, 3, drive.rotation_rate.as_flattened()),
+                (field::MEMORY, Memory::WIDTH, &memory[..]),
             ];
-            let mut blocks = vec![Block::f64s(field::DRAG_COEFFICIENT, n)];
-            blocks.extend(vectors.iter().map(|f| Block::f64s(f.0, 3 * n)));
+            // those behind the first four only if they are asked for, from no particles too
+            let asked = |name: u32| match name {
+                field::ADDED_MASS => self.step.extra().felderhof,
+                field::ROTATION_COEFFICIENT | field::ROTATION_RATE => self.step.extra().torque,
+                field::MEMORY => self.step.extra().history,
+                _ => true,
+            };
+            let mut blocks: Vec<_> =
+                arrays.iter().filter(|f| asked(f.0)).map(|f| Block::f64s(f.0, f.1 * n)).collect();
             if let Some(name) = &file {
                 blocks.extend([Block::bytes(field::RESTART_FILE, name.len()), Block::f64s(field::FLAGS, 1)]);
             }
             let own = || particles.origin.iter().enumerate().filter(|(_, o)| o.0 as usize == i);
             self.partners.send(i, kind::DRIVE, k, time, &blocks, |words| {
-                if let Some(to) = frame::f64s_mut(words, field::DRAG_COEFFICIENT) {
-                    own().for_each(|(p, o)| to[o.1 as usize] = drive.drag_coefficient[p]);
-                }
                 if let (Some(name), Some(to)) = (&file, frame::array_mut(words, field::RESTART_FILE)) {
                     for (word, bytes) in to.iter_mut().zip(name.as_bytes().chunks(8)) {
                         let mut all = [0; 8];
@@ -426,9 +485,11 @@ impl<T: Transport> Exchange<'_, T> {
                 if let Some(to) = frame::f64s_mut(words, field::FLAGS) {
                     to[0] = f64::from(u8::from(last));
                 }
-                for (name, from) in vectors {
+                for (name, width, from) in arrays {
                     let Some(to) = frame::f64s_mut(words, name) else { continue };
-                    own().for_each(|(p, o)| to[3 * o.1 as usize..][..3].copy_from_slice(&from[p]));
+                    own().for_each(|(p, o)| {
+                        to[width * o.1 as usize..][..width].copy_from_slice(&from[width * p..][..width]);
+                    });
                 }
             })?;
         }
@@ -463,9 +524,9 @@ impl<T: Transport> Exchange<'_, T> {
         &mut self,
         mut o: Open,
         next: Option<&Particles>,
-        left: &mut [f64; 3],
-        summary: &mut Summary,
+        course: &mut Course,
     ) -> Result<(), CoupleError> {
+        let Course { left, summary, .. } = course;
         if let Some(p) = next {
             // action = impulse applied + change of the ledger; vanished particles' ledger goes to `left`
             let conservative = self.step.conservative();
@@ -485,6 +546,12 @@ impl<T: Transport> Exchange<'_, T> {
         summary.ledger_left = o.row.ledger_left;
         summary.worst_action_reaction =
             summary.worst_action_reaction.max(o.row.action_reaction_error.unwrap_or_default());
-        self.monitor.write(&o.row).map_err(|source| CoupleError::File { what: "monitor.csv", source })
+        if let Some(r) = &self.recorder {
+            r.row(&o.row)?;
+        }
+        self.monitor
+            .iter_mut()
+            .try_for_each(|m| m.write(&o.row))
+            .map_err(|source| CoupleError::File { what: "monitor.csv", source })
     }
 }

@@ -33,11 +33,14 @@ pub mod bench;
 pub mod commands;
 pub mod config;
 pub mod sums;
+pub mod threads;
 
 pub mod comm;
 pub mod couple;
+pub mod inspect;
 pub mod launch;
 pub mod monitor;
 pub mod output;
 pub mod partners;
+pub mod record;
 pub mod setup;

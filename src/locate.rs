@@ -6,6 +6,7 @@
 //! plane faces the answer does not depend on the first guess; on warped faces the guess is not used.
 
 use crate::mesh::{Mesh, NONE, Side};
+use crate::threads;
 
 /// A particle without a host cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,8 +66,22 @@ impl Locator {
 
     /// Finds all host cells. `host`: in: guesses or `NONE`; out: slots. Errors list every lost particle.
     pub fn locate(&self, mesh: &Mesh, position: &mut [[f64; 3]], host: &mut [u32]) -> Result<(), Vec<Lost>> {
+        const PIECE: usize = 4096;
+        let pieces = position.chunks_mut(PIECE).zip(host.chunks_mut(PIECE)).enumerate().collect();
+        let lost = threads::map(pieces, |(k, (x, h))| self.locate_piece(mesh, k * PIECE, x, h)).concat();
+        if lost.is_empty() { Ok(()) } else { Err(lost) }
+    }
+
+    fn locate_piece(
+        &self,
+        mesh: &Mesh,
+        first: usize,
+        position: &mut [[f64; 3]],
+        host: &mut [u32],
+    ) -> Vec<Lost> {
         let mut lost = Vec::new();
-        for (index, (x, h)) in position.iter_mut().zip(host.iter_mut()).enumerate() {
+        for (k, (x, h)) in position.iter_mut().zip(host.iter_mut()).enumerate() {
+            let index = first + k;
             let guess = if self.planar && *h != NONE { *h } else { self.seed[self.bin_of(*x)] };
             let mut y = *x;
             *h = match self.walk(mesh, guess, &mut y) {
@@ -88,7 +103,7 @@ impl Locator {
                 *x = y;
             }
         }
-        if lost.is_empty() { Ok(()) } else { Err(lost) }
+        lost
     }
 }
 

@@ -53,6 +53,45 @@ enum Command {
         #[arg(long)]
         restart: Option<PathBuf>,
     },
+    /// Runs the coupling step on a recording, without the partners, and compares its replies with those recorded
+    Replay {
+        /// recording (made by `voidage run CASE --set record.every=1`)
+        file: PathBuf,
+        /// override a setting of the recorded case: section.key=value (repeatable)
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        set: Vec<String>,
+        /// compare with the replies in this recording instead
+        #[arg(long, value_name = "FILE2")]
+        compare: Option<PathBuf>,
+        /// record the replay
+        #[arg(long, value_name = "FILE")]
+        save: Option<PathBuf>,
+    },
+    /// Tells what a scene is made of, which terms matter in it, and what should be changed
+    Inspect {
+        /// recording, or folder with case.toml
+        file: PathBuf,
+        /// override a setting: section.key=value (repeatable)
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        set: Vec<String>,
+        /// terms above it are to be modelled
+        #[arg(long, default_value_t = 1e-2)]
+        accuracy: f64,
+    },
+    /// Writes a recording as ParaView series or as CSV tables, with its monitor
+    Export {
+        /// recording
+        file: PathBuf,
+        /// folder, new or empty [default: beside the recording, named after it]
+        #[arg(long, value_name = "FOLDER")]
+        into: Option<PathBuf>,
+        /// vtk (.pvd with .vtu and .vtp) or csv
+        #[arg(long, default_value = "vtk")]
+        format: String,
+        /// every n-th recorded exchange
+        #[arg(long, default_value_t = 1)]
+        every: usize,
+    },
     /// Prints the reference of case.toml, or of monitor.csv
     Explain {
         /// case or monitor
@@ -64,6 +103,9 @@ enum Command {
         /// also write all numbers to this file (fields: src/bench/report.rs)
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
+        /// also draw the smoothers' time over their error (SVG)
+        #[arg(long, value_name = "FILE")]
+        plot: Option<PathBuf>,
         /// a tenth of the size, for a first look
         #[arg(long)]
         quick: bool,
@@ -84,8 +126,15 @@ fn main() -> ExitCode {
         Command::Run { case, into, set, restart } => commands::run(&case, into.as_deref(), &set, restart),
         Command::Check { case, set } => commands::check(&case, &set),
         Command::Couple { case, resolved, restart } => commands::couple(&case, resolved, restart.as_deref()),
+        Command::Replay { file, set, compare, save } => {
+            commands::record::replay(&file, &set, compare.as_deref(), save.as_deref())
+        }
+        Command::Inspect { file, set, accuracy } => commands::inspect::inspect(&file, &set, accuracy),
+        Command::Export { file, into, format, every } => {
+            commands::export::export(&file, into.as_deref(), &format, every)
+        }
         Command::Explain { topic } => commands::explain(&topic),
-        Command::Bench { json, quick } => commands::bench(json.as_deref(), quick),
+        Command::Bench { json, plot, quick } => commands::bench(json.as_deref(), plot.as_deref(), quick),
         Command::Version => commands::version(),
     };
     ExitCode::from(code)

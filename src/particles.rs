@@ -2,16 +2,19 @@
 //! Stage 1, receive: particles of all DEM ranks in one table.
 //!
 //! Reads PARTICLES frames (SI units); writes one table in which every particle keeps its place of the last
-//! exchange (by cell, `arrange`), new ones behind in the order of their ids. Does not know the mesh.
+//! exchange (by cell, `arrange`), new ones behind in the order of their ids; brings it into a new order. Does not know
+//! the mesh.
 
 use crate::arrange::Places;
+use crate::forces::history::Memory;
 use crate::mesh::NONE;
 use crate::scheme::History;
+use crate::{sums, threads};
 use std::f64::consts::PI;
 use thiserror::Error;
 use voidage_wire::{Frame, WireError, field};
 
-/// All particles of one exchange; the order is that of the last exchange, no result depends on it.
+/// All particles of one exchange, in the order of the last one when received, in that of this one once located.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Particles {
     /// global id
@@ -30,8 +33,21 @@ pub struct Particles {
     pub ledger: Vec<[f64; 3]>,
     /// last interval, if the scheme wants it
     pub history: History,
+    /// what only some cases ask for
+    pub asked: Asked,
     /// N s, sums over all particles, those that vanished since included
     pub totals: Totals,
+}
+
+/// What the DEM sends when a force asks for it; empty if not.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Asked {
+    /// type
+    pub kind: Vec<i64>,
+    /// angular velocity, rad/s
+    pub spin: Vec<[f64; 3]>,
+    /// what a force left with the particle in the last exchange
+    pub memory: Vec<Memory>,
 }
 
 /// Sums the DEM reports for the last interval, N s.
@@ -41,6 +57,15 @@ pub struct Totals {
     pub taken: [f64; 3],
     /// impulse charged to the fluid
     pub charged: [f64; 3],
+}
+
+/// Memory `Particles::arrange` copies through.
+#[derive(Clone, Debug, Default)]
+pub struct Spare {
+    ids: Vec<i64>,
+    origins: Vec<(u32, u32)>,
+    numbers: Vec<f64>,
+    vectors: Vec<[f64; 3]>,
 }
 
 /// A particle that cannot be coupled.
@@ -93,13 +118,11 @@ impl Particles {
         let order = in_order(&ids, last)?;
         let vectors = |name: u32| -> Result<Vec<[f64; 3]>, WireError> {
             let parts = frames.iter().zip(&ids).map(|(f, i)| f.vectors_of(name, i.len()));
-            let parts = parts.collect::<Result<Vec<_>, _>>()?;
-            Ok(order.iter().map(|o| parts[o.1 as usize][o.2 as usize]).collect())
+            Ok(gathered(&parts.collect::<Result<Vec<_>, _>>()?, &order))
         };
         let scalars = |name: u32| -> Result<Vec<f64>, WireError> {
             let parts = frames.iter().zip(&ids).map(|(f, i)| f.f64s_of(name, i.len()));
-            let parts = parts.collect::<Result<Vec<_>, _>>()?;
-            Ok(order.iter().map(|o| parts[o.1 as usize][o.2 as usize]).collect())
+            Ok(gathered(&parts.collect::<Result<Vec<_>, _>>()?, &order))
         };
         let mut totals = Totals::default();
         for f in frames {
@@ -117,8 +140,27 @@ impl Particles {
                 velocity: vectors(field::LAST_VELOCITY)?,
             };
         }
+        let mut asked = Asked::default();
+        let sent = |name: u32| !frames.is_empty() && frames.iter().all(|f| f.raw(name).is_some());
+        if sent(field::TYPE) {
+            let parts = frames.iter().map(|f| f.i64s(field::TYPE)).collect::<Result<Vec<_>, _>>()?;
+            let of = |o: &(i64, u32, u32)| parts[o.1 as usize].get(o.2 as usize).copied().unwrap_or_default();
+            asked.kind = order.iter().map(of).collect();
+        }
+        if sent(field::ANGULAR_VELOCITY) {
+            asked.spin = vectors(field::ANGULAR_VELOCITY)?;
+        }
+        if sent(field::LAST_MEMORY) {
+            let part = |(f, i): (&Frame, &&[i64])| -> Result<Vec<Memory>, WireError> {
+                let flat = f.f64s_of(field::LAST_MEMORY, Memory::WIDTH * i.len())?;
+                Ok(flat.as_chunks().0.iter().map(|m| Memory(*m)).collect())
+            };
+            let parts = frames.iter().zip(&ids).map(part).collect::<Result<Vec<_>, _>>()?;
+            asked.memory = order.iter().map(|o| parts[o.1 as usize][o.2 as usize]).collect();
+        }
         let p = Self {
             history,
+            asked,
             position: vectors(field::POSITION)?,
             velocity: vectors(field::VELOCITY)?,
             radius: scalars(field::RADIUS)?,
@@ -132,13 +174,51 @@ impl Particles {
         Ok(p)
     }
 
+    /// Brings the table into the order of `list`, places in it as it is.
+    pub fn arrange(&mut self, list: &[u32], spare: &mut Spare) {
+        let h = &mut self.history;
+        permute(&mut self.id, list, &mut spare.ids);
+        permute(&mut self.origin, list, &mut spare.origins);
+        permute(&mut self.asked.kind, list, &mut spare.ids);
+        permute(&mut self.asked.spin, list, &mut spare.vectors);
+        permute(&mut self.asked.memory, list, &mut Vec::new());
+        for array in [&mut self.radius, &mut self.mass, &mut h.drag_coefficient] {
+            permute(array, list, &mut spare.numbers);
+        }
+        for array in [
+            &mut self.position,
+            &mut self.velocity,
+            &mut self.ledger,
+            &mut h.impulse,
+            &mut h.drive,
+            &mut h.force,
+            &mut h.velocity,
+        ] {
+            permute(array, list, &mut spare.vectors);
+        }
+    }
+
     fn check(&self) -> Result<(), ParticleError> {
+        let vectors = [&self.position, &self.velocity, &self.ledger];
+        let positive = |v: &[f64]| v.iter().fold(true, |all, x| all & (*x > 0.0));
+        let good = vectors.iter().all(|v| sums::finite(v.as_flattened()))
+            && [&self.radius, &self.mass].iter().all(|v| sums::finite(v) && positive(v));
+        let asked = !self.asked.spin.is_empty() || !self.asked.memory.is_empty();
+        if good && self.history.drag_coefficient.is_empty() && !asked {
+            return Ok(());
+        }
         let finite = |v: &[f64; 3]| v.iter().all(|x| x.is_finite());
         for i in 0..self.len() {
             let what = match () {
                 () if !finite(&self.position[i]) => format!("position {:?}", self.position[i]),
                 () if !finite(&self.velocity[i]) => format!("velocity {:?}", self.velocity[i]),
                 () if !finite(&self.ledger[i]) => format!("ledger {:?}", self.ledger[i]),
+                () if self.asked.spin.get(i).is_some_and(|w| !finite(w)) => {
+                    format!("angular velocity {:?}", self.asked.spin[i])
+                }
+                () if self.asked.memory.get(i).is_some_and(|m| !m.0.iter().all(|x| x.is_finite())) => {
+                    "what it remembers of its past is not a finite number".into()
+                }
                 () if self.history.wrong(i) => "its last interval is not a finite number".into(),
                 () if !(self.radius[i] > 0.0 && self.radius[i].is_finite()) => {
                     format!("radius {}", self.radius[i])
@@ -150,6 +230,28 @@ impl Particles {
         }
         Ok(())
     }
+}
+
+/// One array of all messages, in the order of the table.
+fn gathered<T: Copy>(parts: &[&[T]], order: &[(i64, u32, u32)]) -> Vec<T> {
+    match parts {
+        [one] => order.iter().map(|o| one[o.2 as usize]).collect(),
+        _ => order.iter().map(|o| parts[o.1 as usize][o.2 as usize]).collect(),
+    }
+}
+
+/// `array` in the order of `list`; an empty one stays empty.
+fn permute<T: Copy + Default + Send + Sync>(array: &mut Vec<T>, list: &[u32], spare: &mut Vec<T>) {
+    const PIECE: usize = 8192;
+    if array.is_empty() {
+        return;
+    }
+    spare.resize(list.len(), T::default());
+    let from = &*array;
+    threads::map(list.chunks(PIECE).zip(spare.chunks_mut(PIECE)).collect(), |(list, to)| {
+        to.iter_mut().zip(list).for_each(|(t, i)| *t = from[*i as usize]);
+    });
+    std::mem::swap(array, spare);
 }
 
 /// (id, rank, position in its message) of all particles: known ones in their last order, then new ones by id.

@@ -7,8 +7,8 @@ use crate::map::Mapping;
 use crate::mesh::Mesh;
 use crate::output::restart::State;
 use crate::partners::Partners;
-use crate::smooth::{self, Diffusion, Smoother};
-use crate::step::Setup;
+use crate::smooth::{self, Classes, Diffusion, Pinned, Smoother};
+use crate::step::{CouplingStep, Setup};
 use crate::{forces, map, scheme};
 use voidage_wire::{Transport, Welcome};
 
@@ -27,7 +27,7 @@ pub fn setup(c: &Config) -> Result<Setup, String> {
         density: f.fluid.density,
         kinematic_viscosity: f.fluid.kinematic_viscosity,
         parcel_factor: 0.05,
-        ratio: f.dem.coarse_graining,
+        ratio: f.dem.coarse_graining.of_all(),
     };
     let stress = forces::parcel::ParticleStress {
         pressure: x.particle_stress,
@@ -55,12 +55,24 @@ pub fn setup(c: &Config) -> Result<Setup, String> {
         voidage_min: f.limits.voidage_min,
         exclude_outside: f.limits.outside == "exclude",
         extra: forces::Extra {
-            ratio: f.dem.coarse_graining,
+            ratio: f.dem.coarse_graining.of_all(),
+            ratio_by_type: f.dem.coarse_graining.by_type(),
             lift: forces::lift::all().iter().copied().find(|l| l.name() == x.lift),
-            added_mass: x.added_mass,
+            added_mass: x.added_mass.coefficient(),
+            felderhof: x.added_mass.law(),
+            history: x.history,
+            torque: x.torque,
             stress: (x.particle_stress > 0.0).then_some(stress),
         },
+        average: smooth::TimeAverage::new(c.period(), f.smooth.time),
     })
+}
+
+/// Threads for the stages; none if one is enough.
+pub fn pool(c: &Config) -> Result<Option<rayon::ThreadPool>, String> {
+    let n = c.file.run.threads as usize;
+    let pool = || rayon::ThreadPoolBuilder::new().num_threads(n).build();
+    (n > 1).then(pool).transpose().map_err(|e| format!("run.threads = {n}: {e}"))
 }
 
 /// The mapping by name, ready for the mesh.
@@ -72,12 +84,38 @@ pub fn mapping(c: &Config, mesh: &Mesh) -> Result<Box<dyn Mapping>, String> {
     Ok(mapping)
 }
 
-/// The smoother asked for and the positive one for redone steps.
+/// Classes of particle sizes.
+pub fn classes(c: &Config, mesh: &Mesh) -> Classes {
+    Classes::new(mesh, &c.file.smooth.by_diameter, c.file.smooth.bandwidth)
+}
+
+/// R's continuation of the solids velocity, if it is asked for.
+pub fn pinned(c: &Config, mesh: &Mesh) -> Option<Pinned> {
+    let s = &c.file.smooth;
+    let t = Diffusion { bandwidth: s.bandwidth, largest_cell: s.largest_cell, ..Diffusion::default() };
+    (c.file.coupling.void_velocity == "pinned").then(|| Pinned::new(mesh, &t.links(mesh)))
+}
+
+/// The smoother asked for and the positive one for redone steps, on the rows of all classes.
 pub fn smoothers(c: &Config, mesh: &Mesh) -> Result<[Box<dyn Smoother>; 2], String> {
     let s = &c.file.smooth;
-    let t = Diffusion::uniform(s.bandwidth).links(mesh);
-    smooth::pair(&s.method, mesh, &t, s.tolerance)
-        .ok_or_else(|| format!("smooth.method = \"{}\" is not known", s.method))
+    let (classes, like) =
+        (classes(c, mesh), Diffusion { largest_cell: s.largest_cell, ..Diffusion::default() });
+    let t = classes.links(mesh, &like);
+    let unknown = || format!("smooth.method = \"{}\" is not known", s.method);
+    if classes.count() == 1 {
+        return smooth::pair(&s.method, mesh, &t, s.tolerance).ok_or_else(unknown);
+    }
+    smooth::pair(&s.method, &classes.mesh(mesh), &t, s.tolerance).ok_or_else(unknown)
+}
+
+/// The coupling step of a case on a mesh.
+pub fn step(c: &Config, mesh: Mesh) -> Result<CouplingStep, String> {
+    let [smoother, positive] = smoothers(c, &mesh)?;
+    let mapping = mapping(c, &mesh)?;
+    let (classes, pinned) = (classes(c, &mesh), pinned(c, &mesh));
+    let step = CouplingStep::new(mesh, setup(c)?, mapping, smoother, positive);
+    Ok(step.with_classes(classes).with_pinned(pinned))
 }
 
 /// What the partners are told (names in `docs/wire.md`).
@@ -91,7 +129,7 @@ pub fn welcome(c: &Config, resume: Option<&State>) -> Welcome {
     set("dem.constant_force", yes(f.dem.force == InInterval::Constant));
     set("coupling.resumed", yes(resume.is_some()));
     set("coupling.first_exchange", resume.map_or(0.0, |s| s.exchange as f64));
-    set("dem.added_mass", f.forces.added_mass * f.fluid.density);
+    set("dem.added_mass", f.forces.added_mass.coefficient() * f.fluid.density);
     set("coupling.interval", f64::from(f.coupling.interval));
     set("fluid.density", f.fluid.density);
     set("fluid.kinematic_viscosity", f.fluid.kinematic_viscosity);
@@ -108,6 +146,11 @@ pub fn welcome(c: &Config, resume: Option<&State>) -> Welcome {
     }
     // what no force and no scheme needs is not sent
     set("send.history", yes(scheme::by_name(&f.coupling.scheme).is_some_and(|s| s.wants_history())));
+    set("send.type", yes(!f.dem.coarse_graining.by_type().is_empty()));
+    set("send.angular_velocity", yes(f.forces.torque));
+    set("drive.added_mass", yes(f.forces.added_mass.law()));
+    set("drive.rotation", yes(f.forces.torque));
+    set("drive.memory", if f.forces.history { forces::history::Memory::WIDTH as f64 } else { 0.0 });
     set("send.pressure_gradient", yes(model_a && f.forces.pressure_gradient));
     set("send.stress_divergence", yes(model_a && f.forces.viscous_stress));
     w

@@ -329,3 +329,103 @@ fn a_light_sphere_is_released_with_the_inertia_of_its_added_mass() {
     // (m_f − m) g/(m + ½ m_f) for 0.01 s: 5·9.81/10
     assert!((rise / (4.905 * 0.01) - 1.0).abs() < 1e-5, "{line}");
 }
+
+/// The number printed behind these words at the end of the script.
+fn printed(case: &Path, what: &str) -> f64 {
+    let log = std::fs::read_to_string(case.join("logs/dem.log")).unwrap();
+    let line = log.lines().rfind(|l| l.starts_with(what)).unwrap_or_else(|| panic!("{what}: {log}"));
+    line.split(' ').next_back().unwrap().parse().unwrap()
+}
+
+#[test]
+fn a_spinning_sphere_in_still_fluid_slows_down_as_kirchhoff_says() {
+    // heavy: explicit in each DEM step; light: K_w dt/I = 1.2, exact relaxation
+    for (density, end, relaxation) in
+        [(3000.0, 0.01, 3000.0 * 1e-8 / (60.0 * 1e-4)), (5.0, 0.0002, 5.0 * 1e-8 / (60.0 * 1e-4))]
+    {
+        let s = Scratch::new(&format!("spin{density}"));
+        copy(&root().join("cases/settling"), &s.case());
+        edit(&s.case().join("fluid/system/controlDict"), "endTime 0.24;", &format!("endTime {end};"));
+        let script = s.case().join("particles.in");
+        edit(&script, "density 3000", &format!("density {density} omegay 100"));
+        edit(
+            &script,
+            "variable        speed",
+            "compute w all property/atom omegay\nvariable spin equal c_w[1]\nvariable        speed",
+        );
+        edit(&script, "v_speed v_height", "v_spin v_speed v_height");
+        edit(&script, "thermo          200", "thermo 4");
+        edit(&script, "print  ", "print \"spin ${spin}\"\nprint  ");
+        let set = ["forces.torque=true", "coupling.feedback=one-way", "forces.drag=none"];
+        let (out, _) = finish(start(&s.case(), &set), Duration::from_secs(60));
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        // I dw/dt = −8 π μ r³ w: relaxation time ρ_p d²/(60 μ)
+        let (spin, exact) = (printed(&s.case(), "spin "), 100.0 * f64::exp(-end / relaxation));
+        let error = (spin - exact).abs() / exact.max(1e-6);
+        assert!(error < 2e-3, "{density}: {spin:e} {exact:e}");
+    }
+}
+
+#[test]
+fn a_sphere_released_in_a_liquid_falls_as_bassets_equation_says() {
+    let s = Scratch::new("basset");
+    copy(&root().join("cases/settling"), &s.case());
+    let control = s.case().join("fluid/system/controlDict");
+    edit(&control, "endTime 0.24;", "endTime 0.004;");
+    edit(&control, "deltaT 2e-4;", "deltaT 2e-5;");
+    edit(&s.case().join("fluid/constant/transportProperties"), "nu 1e-5;", "nu 1e-6;");
+    edit(&s.case().join("particles.in"), "density 3000", "density 2650");
+    let common = [
+        "fluid.density=1000.0",
+        "fluid.kinematic_viscosity=1e-6",
+        "fluid.flow=frozen",
+        "coupling.interval=2",
+        "coupling.feedback=one-way",
+        "forces.drag=stokes",
+        "forces.added_mass=0.5",
+    ];
+    // (m + m_f/2) dv/dt + 3π μ d v + 3/2 d² √(π ρ μ) ∫ v'/√(t−τ) = (m − m_f) g, inverted numerically from
+    // V(s) = A/(s (M s + B √s + C)), at 4 ms; without the history A/C (1 − e^{−C t/M})
+    for (history, exact) in [(true, 4.936934e-3), (false, 8.077950e-3)] {
+        let history = format!("forces.history={history}");
+        let set: Vec<&str> = common.iter().copied().chain([history.as_str()]).collect();
+        let (out, _) = finish(start(&s.case(), &set), Duration::from_secs(120));
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let fall = printed(&s.case(), "terminal velocity");
+        assert!((fall / exact - 1.0).abs() < 0.02, "{history}: {fall:e} {exact:e}");
+    }
+}
+
+#[test]
+fn all_models_at_once_on_two_ranks_keep_the_third_law() {
+    let s = Scratch::new("models");
+    copy(&root().join("cases/periodic-box"), &s.case());
+    edit(&s.case().join("fluid/system/controlDict"), "endTime 2.0826;", "endTime 0.00712;");
+    let set = [
+        "run.dem_ranks=2",
+        "run.cfd_ranks=2",
+        "forces.history=true",
+        "forces.torque=true",
+        "forces.added_mass=felderhof",
+        "forces.lift=saffman-mei",
+        "dem.coarse_graining={ 1 = 1.5 }",
+        "smooth.by_diameter=[[2e-4, 4e-4]]",
+        "smooth.largest_cell=1e-3",
+    ];
+    let (out, _) = finish(start(&s.case(), &set), Duration::from_secs(120));
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let rows = std::fs::read_to_string(s.case().join("monitor.csv")).unwrap();
+    let mut lines = rows.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let column = |name: &str| names.iter().position(|c| *c == name).unwrap();
+    let rows: Vec<Vec<f64>> =
+        lines.map(|l| l.split(',').map(|x| x.parse().unwrap_or(f64::NAN)).collect()).collect();
+    let worst = |name: &str| rows.iter().map(|r| r[column(name)]).fold(0.0, f64::max);
+    assert!(rows.len() > 15, "{}", rows.len());
+    assert!(
+        worst("action_reaction_error") <= 1e-12 && worst("action_reaction_error") > 0.0,
+        "{}",
+        worst("action_reaction_error")
+    );
+    assert!(worst("solid_volume_error") <= 1e-12);
+}

@@ -389,8 +389,11 @@ fn linear_halves_the_error_of_the_particle_centroid() {
             m.prepare(&mesh, &Options { bandwidth: b, grid: 1.0 });
             let mut lanes = vec![[0.0; 8]; mesh.len()];
             let mut order = Order::default();
-            order.update(mesh.len(), &(0..c.host.len() as i64).collect::<Vec<_>>(), &c.host);
-            weights(m.as_ref(), &mesh, &c).deposit(&mesh, &order.list, &mut lanes, |_| [1.0; 8]);
+            let list = order.update(mesh.len(), &(0..c.host.len() as i64).collect::<Vec<_>>(), &c.host);
+            let position = list.iter().map(|i| c.position[*i as usize]).collect();
+            let host = list.iter().map(|i| c.host[*i as usize]).collect();
+            let c = Cloud { position, host, radius: c.radius.clone() };
+            weights(m.as_ref(), &mesh, &c).deposit(&mesh, &order, &mut lanes, |_, _: &mut ()| [1.0; 8]);
             if name != "kernel" {
                 let t = Diffusion::uniform(b).links(&mesh);
                 let mut s = smooth::by_name("uniformization", &mesh, &t, 1e-10).unwrap();

@@ -74,6 +74,16 @@ fn errors() {
         (SETTLING, &[], &["limits.wait=0.1"], &["limits.wait = 0.1", "between 1e0"]),
         (SETTLING, &[], &["limits.voidage_min=2.0"], &["limits.voidage_min = 2", "between"]),
         (BED, &[], &["smooth.tolerance=0.5"], &["smooth.tolerance = 0.5", "between"]),
+        (BED, &[], &["smooth.bandwidth=wide"], &["smooth.bandwidth = \"wide\"", "a number (m), or \"wake\""]),
+        (
+            BED,
+            &[
+                ("fluid/0/U", "0 0.9 0", "0 0 0"),
+                ("case.toml", "gravity = [0.0, -9.81, 0.0]", "gravity = [0.0, 0.0, 0.0]"),
+            ],
+            &["smooth.bandwidth=wake"],
+            &["smooth.bandwidth = \"wake\"", "there is no wake", "a number, m"],
+        ),
         (BED, &[], &["smooth.bandwidth=0.0"], &["smooth.bandwidth = 0", "give smooth.bandwidth in m"]),
         (SETTLING, &[], &["run.dem_ranks=0"], &["run.dem_ranks = 0", "at least 1", "run.dem_ranks = 1"]),
         (SETTLING, &[], &["run.cfd_ranks=0"], &["run.cfd_ranks = 0", "run.cfd_ranks = 1"]),
@@ -155,6 +165,73 @@ fn errors() {
             &["dem.force=constant"],
             &["the constant force errs by 0.6 % of the drag", "dem.force = \"implicit\""],
         ),
+        (
+            BED,
+            &[],
+            &["smooth.by_diameter=[[2e-3, 8e-3], [1e-3, 4e-3]]"],
+            &["smooth.by_diameter = [[0.002, 0.008], [0.001, 0.004]]", "must ascend"],
+        ),
+        (BED, &[], &["smooth.by_diameter=[[2e-3, -1.0]]"], &["smooth.by_diameter = -1", "a bandwidth"]),
+        (SETTLING, &[], &["smooth.by_diameter=[[2e-3, 8e-3]]"], &["nothing is smoothed", "\"chebyshev\""]),
+        (
+            BED,
+            &[],
+            &["coupling.void_velocity=pinned"],
+            &["coupling.void_velocity = pinned", "coupling.scheme = \"implicit\""],
+        ),
+        (
+            SETTLING,
+            &[],
+            &["coupling.void_velocity=pinned", "coupling.scheme=implicit"],
+            &["coupling.void_velocity = pinned", "nothing is smoothed"],
+        ),
+        (BED, &[], &["coupling.void_velocity=pined"], &["accepted: kernel, pinned", "\"pinned\"?"]),
+        (BED, &[], &["smooth.largest_cell=-1.0"], &["smooth.largest_cell = -1", "between"]),
+        (BED, &[], &["smooth.time=-1.0"], &["smooth.time = -1", "between"]),
+        (
+            BED,
+            &[],
+            &["smooth.time=0.1", "coupling.continuity=solids-flux"],
+            &["smooth.time = 0.1", "do not fit", "\"voidage-rate\""],
+        ),
+        (
+            BED,
+            &[],
+            &["dem.coarse_graining={ steel = 2.0 }"],
+            &["dem.coarse_graining = steel", "{ 1 = 4.0, 2 = 10.0 }"],
+        ),
+        (BED, &[], &["dem.coarse_graining={ 1 = 0.5 }"], &["dem.coarse_graining.1 = 0.5", "between"]),
+        (
+            BED,
+            &[],
+            &["dem.coarse_graining=big"],
+            &["dem.coarse_graining: a number, or one for each particle type"],
+        ),
+        (
+            BED,
+            &[],
+            &[
+                "dem.coarse_graining={ 1 = 2.0 }",
+                "forces.drag=beetstra-filtered",
+                "forces.filter_diameter=1e-3",
+                "forces.filter_density=1000.0",
+            ],
+            &["dem.coarse_graining = by type", "one ratio for all"],
+        ),
+        (
+            BED,
+            &[],
+            &["forces.added_mass=felderhoff"],
+            &["forces.added_mass = \"felderhoff\"", "forces.added_mass = \"felderhof\"?"],
+        ),
+        (BED, &[], &["forces.torque=much"], &["invalid type", "expected a boolean"]),
+        // 18/√π 1000/3000 √(1e-5 2e-4)/1e-4
+        (
+            SETTLING,
+            &[],
+            &["forces.history=true", "fluid.density=1000.0"],
+            &["forces.history = true", "by 1.51 of it", "a fluid step of at most 2.2e-5 s"],
+        ),
         (SETTLING, &[], &["fluid.case=nowhere"], &["fluid.case = nowhere", "controlDict"]),
     ];
     for (i, (case, edits, set, says)) in table.iter().enumerate() {
@@ -222,6 +299,21 @@ fn warnings() {
             &["tau_f: explicit coupling may be unstable", "R eq. 10"],
         ),
     ];
+    let more: &[Message] = &[
+        (
+            BED,
+            &[],
+            &["smooth.time=0.1"],
+            &["smooth.time = 0.1", "solid_volume_error", "breaks the third law"],
+        ),
+        (
+            SETTLING,
+            &[],
+            &["forces.history=true", "fluid.density=400.0"],
+            &["forces.history = true", "0.61 of it"],
+        ),
+    ];
+    let table = [table, more].concat();
     for (i, (case, edits, set, says)) in table.iter().enumerate() {
         let (_, text) = check(&format!("w{i}"), case, edits, set);
         let lines: Vec<&str> = text.lines().filter(|l| l.starts_with("warning:")).collect();
@@ -229,6 +321,19 @@ fn warnings() {
             assert!(lines.iter().any(|l| l.contains(w)), "{w:?} is missing ({set:?} {edits:?}): {text}");
         }
     }
+    // the bandwidth against the wake: Re = 0.9 m/s 1.2 mm / 1.5e-5 m2/s; and as a value
+    let (_, text) = check("wake-note", BED, &[], &[]);
+    let says = [
+        "note: smooth.bandwidth = 0.0048: 4.00 particle diameters",
+        "Re 72.00",
+        "b = 5.0 diameters",
+        "4 to 6",
+    ];
+    assert!(says.iter().all(|w| text.contains(w)), "{text}");
+    let (code, text) = check("wake", BED, &[], &["smooth.bandwidth=wake"]);
+    assert!(code == 0 && text.contains("note: smooth.bandwidth = 0.0059") && text.contains("4.9"), "{text}");
+    let (_, text) = check("wake-far", BED, &[], &["smooth.bandwidth=0.03"]);
+    assert!(text.contains("warning: smooth.bandwidth = 0.03: 25.00 particle diameters"), "{text}");
     // settled walls that let the fluid slip have no profile: nothing to warn of
     assert!(!check("slip", BED, &[], &[]).1.contains("laminar profile"));
 }

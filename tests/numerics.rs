@@ -307,6 +307,7 @@ fn setup(scheme: &str, fluid_velocity: FluidVelocity, model_b: bool) -> Setup {
         voidage_min: 0.0,
         exclude_outside: false,
         extra: forces::Extra::default(),
+        average: None,
     }
 }
 
@@ -346,7 +347,7 @@ fn exchange(
     });
     step.books.reaction = reaction;
     let error = step.books.error(None);
-    let Drive { drag_coefficient, velocity, force, charged } = &step.drive;
+    let Drive { drag_coefficient, velocity, force, charged, .. } = &step.drive;
     let bits = |i: usize| {
         let all = [[drag_coefficient[i]].as_slice(), &velocity[i], &force[i], &charged[i]].concat();
         (p.id[i], std::array::from_fn(|k| all[k].to_bits()))
@@ -391,7 +392,8 @@ fn action_is_reaction_with_lift_added_mass_parcels_and_their_stress() {
                 floor: 1e-7,
             });
             let plain = with(forces::Extra::default());
-            let all = with(forces::Extra { ratio: 2.0, lift, added_mass: 0.5, stress });
+            let all =
+                with(forces::Extra { ratio: 2.0, lift, added_mass: 0.5, stress, ..forces::Extra::default() });
             assert!(plain.2 < 1e-12 && all.2 < 1e-12, "{:e} {:e}", plain.2, all.2);
             assert!(plain.1 != all.1 && plain.0.sp != all.0.sp && plain.0.voidage == all.0.voidage);
             let one = with(forces::Extra { stress, ..forces::Extra::default() });
@@ -584,4 +586,56 @@ fn a_scheme_that_needs_the_last_interval_says_so() {
     p.history = scheme::History::default();
     let e = step.before_fluid(&mut p, true).unwrap_err().to_string();
     assert!(e.contains("conservative-adaptive") && e.contains("./setup build"), "{e}");
+}
+
+/// Bits of Sp, Su, ε and of each particle's reply (by id) after two exchanges on so many threads.
+fn bits_on(
+    threads: usize,
+    backwards: bool,
+    mapping: &str,
+) -> (Vec<[u64; 5]>, Vec<(i64, [u64; 10])>, [u64; 7]) {
+    use voidage::bench::{scene, step::setup};
+    let mesh = scene::mesh(scene::BOX, 12_000);
+    let air = scene::air(&mesh);
+    let mut map = voidage::map::all().into_iter().find(|m| m.name() == mapping).unwrap();
+    map.prepare(&mesh, &voidage::map::Options::default());
+    let [g, positive] = ["chebyshev", "uniformization"].map(|name| smoother(name, &mesh, 5e-3, 1e-3));
+    let mut step = CouplingStep::new(mesh, setup("syamlal-obrien").unwrap(), map, g, positive);
+    let mut p = scene::bed(scene::BOX, 20_000, scene::DIAMETER);
+    if backwards {
+        let list: Vec<u32> = (0..p.len() as u32).rev().collect();
+        p.arrange(&list, &mut voidage::particles::Spare::default());
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    for first in [true, false] {
+        pool.install(|| {
+            step.before_fluid(&mut p, first).unwrap();
+            step.after_fluid(&p, &air, first).unwrap();
+        });
+        for (x, id) in p.position.iter_mut().zip(&p.id) {
+            x[0] = (x[0] + 1e-4 * (id % 7) as f64).min(scene::BOX[0]);
+        }
+    }
+    let (s, d) = (&step.sources, &step.drive);
+    let cell = |j: usize| [s.voidage[j], s.sp[j], s.su[j][0], s.su[j][1], s.su[j][2]].map(f64::to_bits);
+    let reply = |i: usize| {
+        let all = [&[d.drag_coefficient[i]], &d.velocity[i][..], &d.force[i], &d.charged[i]].concat();
+        (p.id[i], std::array::from_fn(|k| all[k].to_bits()))
+    };
+    let mut replies: Vec<_> = (0..p.len()).map(reply).collect();
+    replies.sort_unstable_by_key(|r: &(i64, _)| r.0);
+    let b = &step.books;
+    let books = [b.charged[0], b.charged[1], b.charged[2], b.old_ledger[0], b.external[1], b.scale];
+    let books = [books.as_slice(), &[step.facts.solid_volume_error]].concat();
+    ((0..step.mesh.len()).map(cell).collect(), replies, std::array::from_fn(|k| books[k].to_bits()))
+}
+
+#[test]
+fn the_whole_step_has_the_same_bits_on_any_number_of_threads_and_in_any_order() {
+    for mapping in ["particle-centroid", "linear"] {
+        let one = bits_on(1, false, mapping);
+        for (threads, backwards) in [(2, false), (4, true)] {
+            assert!(bits_on(threads, backwards, mapping) == one, "{mapping} on {threads} threads");
+        }
+    }
 }

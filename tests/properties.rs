@@ -9,7 +9,7 @@ use voidage::interpolate::FluidVelocity;
 use voidage::map::{self, Weights};
 use voidage::mesh::Mesh;
 use voidage::mesh::made::Made;
-use voidage::particles::Particles;
+use voidage::particles::{Particles, Spare};
 use voidage::scheme::{self, History};
 use voidage::smooth::{self, Active, Diffusion, Direction, Scratch};
 use voidage::step::{CouplingStep, Fluid, Setup};
@@ -95,6 +95,7 @@ fn setup(scheme: &'static dyn scheme::Scheme, how: FluidVelocity, model_b: bool)
         voidage_min: 0.0,
         exclude_outside: false,
         extra: forces::Extra::default(),
+        average: None,
     }
 }
 
@@ -215,13 +216,15 @@ proptest! {
         let mut host = vec![u32::MAX; n];
         locate::Locator::new(&mesh).locate(&mesh, &mut p.position, &mut host).unwrap();
         let mut order = Order::default();
-        order.update(mesh.len(), &p.id, &host);
+        let list = order.update(mesh.len(), &p.id, &host);
+        p.arrange(list, &mut Spare::default());
+        host = list.iter().map(|i| host[*i as usize]).collect();
         for mapping in map::all().iter_mut().filter(|m| m.conservative()) {
             let mut w = Weights::default();
             mapping.prepare(&mesh, &OPTIONS);
             mapping.weights(&mesh, &p.position, &p.radius, &host, &mut w);
             let mut lanes = vec![[0.0; 8]; mesh.len()];
-            w.deposit(&mesh, &order.list, &mut lanes, |i| [p.volume(i), 1.0, p.velocity[i][0], 0.0, 0.0, 0.0, 0.0, 0.0]);
+            w.deposit(&mesh, &order, &mut lanes, |i, _: &mut ()| [p.volume(i), 1.0, p.velocity[i][0], 0.0, 0.0, 0.0, 0.0, 0.0]);
             let total = |l: usize| sum(lanes.iter().zip(&mesh.volume).map(|(x, v)| x[l] * v));
             let volume = sum((0..n).map(|i| p.volume(i)));
             prop_assert!((total(0) / volume - 1.0).abs() < 1e-12 && (total(1) / n as f64 - 1.0).abs() < 1e-12);

@@ -214,3 +214,30 @@ fn a_killed_run_goes_on_from_its_newest_set() {
     assert_eq!(whole.rows(), broken.rows(), "every exchange once, and the same");
     assert_eq!(sets(&broken.0).len(), 2, "output.restarts sets are kept");
 }
+
+#[test]
+fn what_forces_keep_with_the_particles_comes_back() {
+    for (tag, force) in [("history", "forces.history=true"), ("torque", "forces.torque=true")] {
+        // the name of the folder goes by the number of options
+        let more: &[&str] = if tag == "history" { &[] } else { &["--set", "smooth.largest_cell=1.0"] };
+        let (one, two) = both("settling", 0.02, &[&["--set", force], more].concat());
+        assert_eq!(one.rows(), two.rows(), "{tag}");
+        let ((a, x), (b, y)) = (one.newest(), two.newest());
+        assert_eq!(
+            (a.voidage, a.velocity, a.particles_sum),
+            (b.voidage, b.velocity, b.particles_sum),
+            "{tag}"
+        );
+        // the table of the fix, bit by bit, but for the times in the head of the file
+        let read = |f: &Path| std::fs::read(f.join("particles")).unwrap();
+        let (x, y) = (read(&x), read(&y));
+        assert_eq!(x.len(), y.len());
+        assert!(x[x.len() - 280..] == y[y.len() - 280..], "{tag}");
+        if tag == "history" {
+            two.entry("endTime", "0.06");
+            let out = two.try_run(&["--restart", "--set", "forces.history=false"]);
+            let text = String::from_utf8_lossy(&out.stderr).into_owned();
+            assert!(!out.status.success() && text.contains("forces.history must be as it was"), "{text}");
+        }
+    }
+}

@@ -4,7 +4,7 @@
 //! Reads how thorough to be; writes numbers with their units in the field names. Ratios are of values measured in
 //! the same run; absolute times are those of this machine at this moment.
 
-use super::{smoother, step, triad};
+use super::{memory, plot, scaling, scene, smoother, step, triad};
 use serde::Serialize;
 
 /// All numbers of one run.
@@ -22,6 +22,10 @@ pub struct Report {
     pub smoother: Smoother,
     /// cost of the mappings
     pub mapping: Mapping,
+    /// memory of the coupler process
+    pub memory: memory::Memory,
+    /// how the step's cost grows
+    pub scaling: Vec<scaling::Series>,
 }
 
 /// Whole coupling steps: all three passes, from locate to replies ready, Koch–Hill, model A.
@@ -46,7 +50,21 @@ pub struct Smoother {
     pub speedup_vs_constdiff: f64,
     /// time ÷ (bytes that must move ÷ triad at that working set)
     pub bytes_bound_ratio: f64,
-    /// every method
+    /// bytes that must move between memory and core in one application
+    pub bytes: f64,
+    /// fields and rows visited, bytes
+    pub working_set_bytes: f64,
+    /// GB/s of the triad at that working set
+    pub triad_gb_per_s: f64,
+    /// cells of the mesh
+    pub cells: usize,
+    /// cells visited
+    pub active_cells: usize,
+    /// finding them anew, ms
+    pub plan_ms: f64,
+    /// one gather, ms
+    pub gather_ms: f64,
+    /// every method: the speed–accuracy table
     pub methods: Vec<smoother::Cost>,
 }
 
@@ -61,16 +79,41 @@ pub struct Mapping {
 
 /// Measures; `quick`: a tenth of the size, for a first look.
 pub fn run(quick: bool, mut say: impl FnMut(&str)) -> Result<Report, String> {
+    say("memory");
+    let memory = memory::run(if quick { 10 } else { 1 })?;
+    let step = steps(quick, &mut say)?;
+    say("cost over two decades of particles and cells");
+    let scaling = scaling::run(if quick { 33_200 } else { 332_000 })?;
+    say("smoother: the default against Crank-Nicolson, backward Euler and others");
+    let smoother = smoothers(quick)?;
+    let weights = |c: &step::Cost| c.map_ms * 1e3 / c.particles as f64;
+    Ok(Report {
+        version: env!("CARGO_PKG_VERSION"),
+        triad_16mb_gb_per_s: triad::bandwidth(16 << 20, 1, 40),
+        triad_256mb_gb_per_s: triad::bandwidth(256 << 20, 1, 8),
+        mapping: Mapping {
+            divided_us_per_particle: weights(&step.cases[3]),
+            linear_us_per_particle: weights(&step.cases[2]),
+        },
+        step,
+        smoother,
+        memory,
+        scaling,
+    })
+}
+
+/// The steps alone.
+pub fn steps(quick: bool, mut say: impl FnMut(&str)) -> Result<Steps, String> {
     let part = if quick { 10 } else { 1 };
-    let repetitions = if quick { 5 } else { 12 };
     let case = |particles: usize, cells: usize, mapping| step::Case {
         particles: particles / part,
+        diameter: scene::DIAMETER,
         cells: cells / part,
         bandwidth: 4.8e-3,
         tolerance: 1e-2,
         drag: "koch-hill",
         mapping,
-        repetitions,
+        repetitions: if quick { 5 } else { 12 },
     };
     let mut cases = Vec::new();
     for (particles, cells, mapping) in [
@@ -82,47 +125,82 @@ pub fn run(quick: bool, mut say: impl FnMut(&str)) -> Result<Report, String> {
         say(&format!("step: {mapping}, {} particles on {} cells", particles / part, cells / part));
         cases.push(step::run(&case(particles, cells, mapping))?);
     }
-    say("smoother: the default against Crank-Nicolson, backward Euler and others");
+    Ok(Steps {
+        us_per_particle_ratio_2: cases[0].us_per_particle,
+        us_per_particle_ratio_16: cases[1].us_per_particle,
+        cases,
+    })
+}
+
+/// The smoothers alone.
+pub fn smoothers(quick: bool) -> Result<Smoother, String> {
     let scene = smoother::Case {
-        cells: 170_000 / part,
+        cells: if quick { 17_000 } else { 170_000 },
         width: 4.0,
         tolerance: 1e-4,
         filled: 0.25,
-        repetitions: if quick { 5 } else { 30 },
+        repetitions: if quick { 5 } else { 15 },
+        rounds: if quick { 2 } else { 5 },
     };
-    let s = smoother::run(&scene, &["uniformization", "crank-nicolson", "backward-euler", "constdiff"])?;
-    let weights = |c: &step::Cost| c.map_ms * 1e3 / c.particles as f64;
-    Ok(Report {
-        version: env!("CARGO_PKG_VERSION"),
-        triad_16mb_gb_per_s: triad::bandwidth(16 << 20, 1, 40),
-        triad_256mb_gb_per_s: triad::bandwidth(256 << 20, 1, 8),
-        mapping: Mapping {
-            divided_us_per_particle: weights(&cases[3]),
-            linear_us_per_particle: weights(&cases[2]),
-        },
-        step: Steps {
-            us_per_particle_ratio_2: cases[0].us_per_particle,
-            us_per_particle_ratio_16: cases[1].us_per_particle,
-            cases,
-        },
-        smoother: Smoother {
-            speedup_vs_cn3: s.speedup_vs_cn3,
-            error_ratio_vs_cn3: s.error_ratio_vs_cn3,
-            speedup_vs_constdiff: s.speedup_vs_constdiff,
-            bytes_bound_ratio: s.bytes_bound_ratio,
-            methods: s.methods,
-        },
+    let mut others: Vec<_> = [1e-1, 1e-2, 1e-3, 1e-6, 1e-8].map(|t| ("chebyshev", t)).into();
+    others.extend([1e-2, 1e-4].map(|t| ("uniformization", t)));
+    others.push(("chebyshev-u", 1e-2));
+    others.extend(["crank-nicolson-1", "backward-euler"].map(|name| (name, 1e-6)));
+    let s = smoother::run(&scene, &others)?;
+    Ok(Smoother {
+        speedup_vs_cn3: s.speedup_vs_cn3,
+        error_ratio_vs_cn3: s.error_ratio_vs_cn3,
+        speedup_vs_constdiff: s.speedup_vs_constdiff,
+        bytes_bound_ratio: s.bytes_bound_ratio,
+        bytes: s.bytes,
+        working_set_bytes: s.working_set,
+        triad_gb_per_s: s.triad,
+        cells: s.cells,
+        active_cells: s.active,
+        plan_ms: 1e3 * s.plan_seconds,
+        gather_ms: 1e3 * s.gather_seconds,
+        methods: s.methods,
     })
 }
 
 impl Report {
     /// For people.
     pub fn table(&self) -> String {
+        let mut t = self.step.table();
+        t += "cost of the step over two decades, particle centroid, b/h = 2.1: particles, cells, ms\n";
+        for s in &self.scaling {
+            let points = s.points.iter().map(|p| format!("  {} {} {:.3}", p.0, p.1, p.2)).collect::<String>();
+            t += &format!("  {:20} N^{:.2}: {points}\n", s.grows, s.exponent);
+        }
+        t += &format!(
+            "memory: {:.0} bytes per cell, {:.0} per particle\n",
+            self.memory.bytes_per_cell, self.memory.bytes_per_particle
+        );
+        format!(
+            "{t}{}machine: triad {:.0} GB/s on 16 MB, {:.0} GB/s on 256 MB",
+            self.smoother.table(),
+            self.triad_16mb_gb_per_s,
+            self.triad_256mb_gb_per_s
+        )
+    }
+}
+
+impl Report {
+    /// The speed–accuracy table as a picture.
+    pub fn plot(&self) -> String {
+        let title = format!("Smoothing seven fields, {} cells, b/h = 4, one thread", self.smoother.cells);
+        plot::svg(&self.smoother.methods, &title)
+    }
+}
+
+impl Steps {
+    /// For people.
+    pub fn table(&self) -> String {
         let mut t = String::from(
             "coupling step, one thread: locate to replies ready, Koch-Hill, model A, b = 4 d, tolerance 1e-2\n  \
              mapping              particles    cells  sweeps  us/particle   locate  order    map  solids  forces sources  gather   drive (ms)\n",
         );
-        for c in &self.step.cases {
+        for c in &self.cases {
             t += &format!(
                 "  {:18} {:11} {:8} {:7} {:12.3} {:8.2} {:6.2} {:6.1} {:7.2} {:7.2} {:7.2} {:7.2} {:7.2}\n",
                 c.mapping,
@@ -140,32 +218,46 @@ impl Report {
                 c.drive_ms
             );
         }
-        let s = &self.smoother;
-        t += "smoother, one thread: seven fields, b/h = 4, a quarter of the box filled, tolerance 1e-4\n  \
-              method                     ms      error   least eps_s   conservation  sweeps\n";
-        for m in &s.methods {
+        t
+    }
+}
+
+impl Smoother {
+    /// For people.
+    pub fn table(&self) -> String {
+        let mut t = format!(
+            "smoother, one thread: seven fields, {} cells, b/h = 4, a quarter of the box filled; CPU time\n  \
+             method               tolerance        ms      error vs Gaussian   least eps_s   conservation  sweeps\n",
+            self.cells
+        );
+        for m in &self.methods {
             t += &format!(
-                "  {:20} {:9.2} {:10.2e} {:13.2e} {:14.1e} {:7}\n",
+                "  {:20} {:9.0e} {:9.2} {:10.2e} {:11.2e} {:13.2e} {:14.1e} {:7}\n",
                 m.name,
+                m.tolerance,
                 m.seconds * 1e3,
                 m.error,
+                m.error_gaussian,
                 m.least,
                 m.conservation,
                 m.degree
             );
         }
-        t += &format!(
+        t + &format!(
             "  default against Crank-Nicolson in 3 steps: {:.1} x faster, error {:.0} x smaller; against one backward \
-             Euler solve per field: {:.1} x faster; {:.2} x the time its bytes need\n\
-             machine: triad {:.0} GB/s on 16 MB, {:.0} GB/s on 256 MB",
-            s.speedup_vs_cn3,
-            s.error_ratio_vs_cn3,
-            s.speedup_vs_constdiff,
-            s.bytes_bound_ratio,
-            self.triad_16mb_gb_per_s,
-            self.triad_256mb_gb_per_s
-        );
-        t
+             Euler solve per field: {:.1} x faster\n  {:.2} x the time its {:.0} MB need at the triad's {:.0} GB/s \
+             ({:.1} MB); finding the {} active cells {:.2} ms, a gather {:.2} ms\n",
+            self.speedup_vs_cn3,
+            self.error_ratio_vs_cn3,
+            self.speedup_vs_constdiff,
+            self.bytes_bound_ratio,
+            self.bytes * 1e-6,
+            self.triad_gb_per_s,
+            self.working_set_bytes * 1e-6,
+            self.active_cells,
+            self.plan_ms,
+            self.gather_ms
+        )
     }
 }
 
@@ -175,6 +267,7 @@ mod tests {
     fn a_small_bench_has_every_number() {
         let case = super::step::Case {
             particles: 2000,
+            diameter: super::scene::DIAMETER,
             cells: 1000,
             bandwidth: 4.8e-3,
             tolerance: 1e-2,

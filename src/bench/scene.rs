@@ -23,9 +23,13 @@ pub fn random(seed: &mut u64) -> f64 {
 
 /// A mesh of about `cells` cubes in a box.
 pub fn mesh(size: [f64; 3], cells: usize) -> Mesh {
+    Made::hex(lines(size, cells), size).mesh()
+}
+
+/// Its cells along each axis.
+pub fn lines(size: [f64; 3], cells: usize) -> [usize; 3] {
     let h = (size.iter().product::<f64>() / cells as f64).cbrt();
-    let n = size.map(|s| ((s / h).round() as usize).max(1));
-    Made::hex(n, size).mesh()
+    size.map(|s| ((s / h).round() as usize).max(1))
 }
 
 /// `n` spheres in a bed of `PACKING` on the bottom (y = 0): a lattice, every sphere pushed about by a third of its

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! What smoothing costs and how exact it is: the default against the papers' way, on the bed of `scene`.
 //!
-//! Times in seconds on the calling thread, best of several; errors relative in L2 (V norm) against exp(Δ_T) to 1e-13.
+//! Times are CPU seconds of the calling thread, medians; errors relative in L2 (V norm) against exp(Δ_T) to 1e-13.
 
-use super::{scene, triad};
+use super::{gauss, scene, triad};
 use crate::locate::Locator;
 use crate::mesh::{Mesh, NONE};
+use crate::particles::Particles;
 use crate::smooth::{Active, Diffusion, Direction, Field, Graph, Scratch, Smoother, on};
+use crate::sums::sum;
 use serde::Serialize;
 use std::sync::Arc;
 use std::time::Instant;
@@ -22,8 +24,10 @@ pub struct Case {
     pub tolerance: f64,
     /// share of the box filled with spheres
     pub filled: f64,
-    /// times each measurement is repeated
+    /// applications of the default per round
     pub repetitions: usize,
+    /// rounds of the default, Crank–Nicolson and backward Euler, each with the triad
+    pub rounds: usize,
 }
 
 /// One method.
@@ -31,10 +35,14 @@ pub struct Case {
 pub struct Cost {
     /// name in case.toml
     pub name: &'static str,
+    /// asked of it (solves: of their residual 1e-6)
+    pub tolerance: f64,
     /// one application on seven fields, s
     pub seconds: f64,
     /// of ε_s
     pub error: f64,
+    /// of ε_s, against the exact Gaussians of the particles (deposit: particle centroid)
+    pub error_gaussian: f64,
     /// smallest ε_s
     pub least: f64,
     /// |Σ V φ' − Σ V φ| / Σ V φ of ε_s
@@ -56,11 +64,11 @@ pub struct Numbers {
     pub methods: Vec<Cost>,
     /// the default, gathering, s
     pub gather_seconds: f64,
-    /// bytes that must move (spread), those of the whole working set, and GB/s of the triad at that working set
+    /// bytes that must move (spread) between memory and core
     pub bytes: f64,
     /// size of the fields and rows visited
     pub working_set: f64,
-    /// GB/s
+    /// GB/s of the triad at that working set
     pub triad: f64,
     /// time of the default ÷ (bytes ÷ triad)
     pub bytes_bound_ratio: f64,
@@ -72,11 +80,21 @@ pub struct Numbers {
     pub speedup_vs_constdiff: f64,
 }
 
+/// Volume of a sphere, m3.
+fn sphere() -> f64 {
+    std::f64::consts::PI / 6.0 * scene::DIAMETER.powi(3)
+}
+
+/// Spheres that fill a share of the box.
+fn bed(filled: f64) -> Particles {
+    let count = (filled * scene::BOX.iter().product::<f64>() * scene::PACKING / sphere()) as usize;
+    scene::bed(scene::BOX, count, scene::DIAMETER)
+}
+
 /// Raw fields of a bed of spheres: ε_s, ε_s U_s, and a force (seven lanes); occupied cells.
 pub fn fields(mesh: &Mesh, filled: f64) -> Result<(Field, Vec<u32>), String> {
-    let sphere = std::f64::consts::PI / 6.0 * scene::DIAMETER.powi(3);
-    let count = (filled * scene::BOX.iter().product::<f64>() * scene::PACKING / sphere) as usize;
-    let mut p = scene::bed(scene::BOX, count, scene::DIAMETER);
+    let (sphere, mut p) = (sphere(), bed(filled));
+    let count = p.len();
     let mut hosts = vec![NONE; count];
     let lost = Locator::new(mesh).locate(mesh, &mut p.position, &mut hosts);
     lost.map_err(|l| format!("{} spheres outside", l.len()))?;
@@ -91,59 +109,101 @@ pub fn fields(mesh: &Mesh, filled: f64) -> Result<(Field, Vec<u32>), String> {
     Ok((field, hosts))
 }
 
-/// Measures the default smoother and these others.
-pub fn run(case: &Case, others: &[&str]) -> Result<Numbers, String> {
+/// The default, and what it is compared with in every round.
+const DEFAULT: &str = "chebyshev";
+const COMPARED: [&str; 2] = ["crank-nicolson", "constdiff"];
+
+/// CPU time of this thread in one call, s: what other programs take of the machine is not in it.
+fn timed(f: impl FnOnce()) -> f64 {
+    let begin = triad::cpu_seconds();
+    f();
+    triad::cpu_seconds() - begin
+}
+
+/// The middle value; NaN if there is none.
+pub fn median(mut x: Vec<f64>) -> f64 {
+    x.sort_by(f64::total_cmp);
+    x.get(x.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// One smoother with its rows.
+struct Entry {
+    smoother: Box<dyn Smoother>,
+    active: Active,
+    seconds: Vec<f64>,
+}
+
+/// Measures the default and what it is compared with side by side, round by round, and these others once.
+/// Ratios are medians over the rounds of the values within a round.
+pub fn run(case: &Case, others: &[(&str, f64)]) -> Result<Numbers, String> {
     let mesh = scene::mesh(scene::BOX, case.cells);
     let (raw, occupied) = fields(&mesh, case.filled)?;
     let h = mesh.volume[0].cbrt();
     let t = Diffusion::uniform(case.width * h).links(&mesh);
     let graph = Arc::new(Graph::new(&mesh, &t));
-    let make = |name: &str, tolerance| on(name, &mesh, &t, &graph, tolerance).ok_or(format!("no {name}"));
+    let make = |name: &str, tolerance| {
+        let smoother = on(name, &mesh, &t, &graph, tolerance).ok_or(format!("no {name}"))?;
+        let mut active = Active::default();
+        let begin = Instant::now();
+        smoother.plan(&occupied, &mut active);
+        Ok::<_, String>((Entry { smoother, active, seconds: Vec::new() }, begin.elapsed().as_secs_f64()))
+    };
     let mut scratch = Scratch::new(mesh.len());
     let mut exact = raw.clone();
-    make("chebyshev", 1e-13)?.apply(&mut exact, &Active::whole(mesh.len()), Direction::Spread, &mut scratch);
-    let norm = |f: &dyn Fn(usize) -> f64| (0..mesh.len()).map(f).sum::<f64>();
+    let whole = Active::whole(mesh.len());
+    make(DEFAULT, 1e-13)?.0.smoother.apply(&mut exact, &whole, Direction::Spread, &mut scratch);
+    let norm = |f: &dyn Fn(usize) -> f64| sum((0..mesh.len()).map(f));
     let size = norm(&|j| mesh.volume[j] * exact[j][0].powi(2));
     let total = norm(&|j| mesh.volume[j] * raw[j][0]);
-    let mut active = Active::default();
-    let mut time = |s: &mut dyn Smoother, active: &Active, direction, times: usize| {
-        let (mut best, mut field) = (f64::INFINITY, raw.clone());
-        for _ in 0..times {
+    let gaussian = gauss::solid_fraction(&bed(case.filled).position, sphere(), case.cells, case.width * h);
+    let gaussian_size = norm(&|j| mesh.volume[j] * gaussian[j].powi(2));
+    let mut field = raw.clone();
+    let mut time = |e: &mut Entry, direction, times: usize, field: &mut Field| {
+        let once = |_| {
             field.copy_from_slice(&raw);
-            let begin = Instant::now();
-            s.apply(&mut field, active, direction, &mut scratch);
-            best = best.min(begin.elapsed().as_secs_f64());
-        }
-        (best, field)
+            timed(|| e.smoother.apply(field, &e.active, direction, &mut scratch))
+        };
+        median((0..times).map(once).collect())
     };
-    let cost = |s: &dyn Smoother, seconds, field: &Field| Cost {
-        name: s.name(),
-        seconds,
+    let cost = |e: &Entry, tolerance, field: &Field| Cost {
+        name: e.smoother.name(),
+        tolerance,
+        seconds: median(e.seconds.clone()),
         error: (norm(&|j| mesh.volume[j] * (field[j][0] - exact[j][0]).powi(2)) / size).sqrt(),
+        error_gaussian: (norm(&|j| mesh.volume[j] * (field[j][0] - gaussian[j]).powi(2)) / gaussian_size)
+            .sqrt(),
         least: field.iter().map(|l| l[0]).fold(f64::INFINITY, f64::min),
         conservation: (norm(&|j| mesh.volume[j] * field[j][0]) / total - 1.0).abs(),
-        degree: s.degree(),
+        degree: e.smoother.degree(),
     };
-    let mut main = make("chebyshev", case.tolerance)?;
-    let begin = Instant::now();
-    main.plan(&occupied, &mut active);
-    let plan_seconds = begin.elapsed().as_secs_f64();
-    let (seconds, field) = time(&mut *main, &active, Direction::Spread, case.repetitions);
-    let mut methods = vec![cost(&*main, seconds, &field)];
-    let (gather_seconds, _) = time(&mut *main, &active, Direction::Gather, case.repetitions);
-    for name in others {
-        let mut s = make(name, case.tolerance)?;
-        let mut rows = Active::default();
-        s.plan(&occupied, &mut rows);
-        let times = if s.bytes(&rows, Direction::Spread) > 0.0 { case.repetitions } else { 2 };
-        let (seconds, field) = time(&mut *s, &rows, Direction::Spread, times);
-        methods.push(cost(&*s, seconds, &field));
+    let (main, plan_seconds) = make(DEFAULT, case.tolerance)?;
+    let (active, bytes) = (main.active.clone(), main.smoother.bytes(&main.active, Direction::Spread));
+    let working_set = graph.bytes(&active, main.smoother.degree(), 2);
+    let mut entries = vec![main];
+    for name in COMPARED {
+        entries.push(make(name, case.tolerance)?.0);
     }
-    let find = |name| methods.iter().find(|m| m.name == name).cloned();
-    let ratio = |name, of: fn(&Cost) -> f64| find(name).map_or(f64::NAN, |m| of(&m) / of(&methods[0]));
-    let bytes = main.bytes(&active, Direction::Spread);
-    let working_set = active.rows.len() as f64 * (3.0 * 64.0 + 76.0);
-    let triad = triad::bandwidth(working_set as usize, 1, 40);
+    let (mut methods, mut triads, mut bound) = (Vec::new(), Vec::new(), Vec::new());
+    for round in 0..case.rounds {
+        for (i, e) in entries.iter_mut().enumerate() {
+            let seconds = time(e, Direction::Spread, if i == 0 { case.repetitions } else { 1 }, &mut field);
+            e.seconds.push(seconds);
+            if round + 1 == case.rounds {
+                methods.push(cost(e, case.tolerance, &field));
+            }
+        }
+        triads.push(triad::bandwidth(working_set as usize, 1, 2 * case.repetitions));
+        bound.push(entries[0].seconds[round] / (bytes / (triads[round] * 1e9)));
+    }
+    let gather_seconds = time(&mut entries[0], Direction::Gather, case.repetitions, &mut field);
+    for (name, tolerance) in others {
+        let mut e = make(name, *tolerance)?.0;
+        let times = if e.smoother.bytes(&e.active, Direction::Spread) > 0.0 { case.repetitions } else { 1 };
+        e.seconds = vec![time(&mut e, Direction::Spread, times, &mut field)];
+        methods.push(cost(&e, *tolerance, &field));
+    }
+    let speedup =
+        |i: usize| median((0..case.rounds).map(|r| entries[i].seconds[r] / entries[0].seconds[r]).collect());
     Ok(Numbers {
         cells: mesh.len(),
         active: active.rows.len(),
@@ -151,11 +211,11 @@ pub fn run(case: &Case, others: &[&str]) -> Result<Numbers, String> {
         gather_seconds,
         bytes,
         working_set,
-        triad,
-        bytes_bound_ratio: seconds / (bytes / (triad * 1e9)),
-        speedup_vs_cn3: ratio("crank-nicolson", |m| m.seconds),
-        error_ratio_vs_cn3: ratio("crank-nicolson", |m| m.error),
-        speedup_vs_constdiff: ratio("constdiff", |m| m.seconds),
+        triad: median(triads),
+        bytes_bound_ratio: median(bound),
+        speedup_vs_cn3: speedup(1),
+        error_ratio_vs_cn3: methods[1].error / methods[0].error,
+        speedup_vs_constdiff: speedup(2),
         methods,
     })
 }

@@ -5,21 +5,22 @@
 //! the errors the step itself reports. Receiving and sending are not in it.
 
 use super::scene;
+use super::triad::cpu_seconds;
 use crate::forces::Extra;
 use crate::interpolate::FluidVelocity;
 use crate::map;
-use crate::particles::Particles;
 use crate::smooth;
 use crate::step::{CouplingStep, Seconds, Setup};
 use crate::{forces, scheme};
 use serde::Serialize;
-use std::time::Instant;
 
 /// The step to be timed.
 #[derive(Clone, Debug)]
 pub struct Case {
     /// number of particles
     pub particles: usize,
+    /// of the spheres, m
+    pub diameter: f64,
     /// number of cells wanted
     pub cells: usize,
     /// b, m
@@ -87,6 +88,7 @@ pub fn setup(drag: &str) -> Result<Setup, String> {
         period: 2e-4,
         voidage_min: 0.0,
         exclude_outside: false,
+        average: None,
         extra: Extra::default(),
     })
 }
@@ -97,14 +99,14 @@ pub fn run(case: &Case) -> Result<Cost, String> {
     let fluid = scene::air(&mesh);
     let mapping = map::all().into_iter().find(|m| m.name() == case.mapping);
     let mut mapping = mapping.ok_or_else(|| format!("mapping {} is not known", case.mapping))?;
-    mapping.prepare(&mesh, &map::Options { bandwidth: case.bandwidth, grid: 2.4 * scene::DIAMETER });
+    mapping.prepare(&mesh, &map::Options { bandwidth: case.bandwidth, grid: 2.4 * case.diameter });
     let t = smooth::Diffusion::uniform(case.bandwidth).links(&mesh);
     let graph = std::sync::Arc::new(smooth::Graph::new(&mesh, &t));
     let smoother = |name| smooth::on(name, &mesh, &t, &graph, case.tolerance).ok_or("no smoother");
     let (main, positive) = (smoother("chebyshev")?, smoother("uniformization")?);
     let (cells, degree) = (mesh.len(), main.degree());
     let mut step = CouplingStep::new(mesh, setup(case.drag)?, mapping, main, positive);
-    let mut p = scene::bed(scene::BOX, case.particles, scene::DIAMETER);
+    let mut p = scene::bed(scene::BOX, case.particles, case.diameter);
     let mut seed = 7;
     let mut cost = Cost {
         mapping: case.mapping,
@@ -116,13 +118,11 @@ pub fn run(case: &Case) -> Result<Cost, String> {
     };
     let mut all = Vec::new();
     for k in 0..=case.repetitions {
-        let begin = Instant::now();
+        let begin = cpu_seconds();
         step.before_fluid(&mut p, k == 0).map_err(|e| e.to_string())?;
         step.after_fluid(&p, &fluid, k == 0).map_err(|e| e.to_string())?;
-        let us = begin.elapsed().as_secs_f64() * 1e6 / p.len() as f64;
+        let us = (cpu_seconds() - begin) * 1e6 / p.len() as f64;
         cost.solid_volume_error = cost.solid_volume_error.max(step.facts.solid_volume_error);
-        // as `receive` does: everyone in its last place
-        p = placed(&p, &step);
         for x in &mut p.position {
             (0..3).for_each(|a| x[a] += 2e-5 * (scene::random(&mut seed) - 0.5));
             (0..3).for_each(|a| x[a] = x[a].clamp(0.0, scene::BOX[a]));
@@ -146,23 +146,5 @@ impl Cost {
         (self.locate_ms, self.arrange_ms, self.map_ms) = (ms(s.locate), ms(s.arrange), ms(s.map));
         (self.solids_ms, self.forces_ms, self.sources_ms) = (ms(s.solids), ms(s.forces), ms(s.sources));
         (self.gather_ms, self.drive_ms) = (ms(s.gather), ms(s.drive));
-    }
-}
-
-/// The table in the places of the last step.
-fn placed(p: &Particles, step: &CouplingStep) -> Particles {
-    let mut order: Vec<usize> = (0..p.len()).collect();
-    order.sort_by_key(|i| step.places().of(p.id[*i]));
-    let pick = |v: &[[f64; 3]]| order.iter().map(|i| v[*i]).collect();
-    Particles {
-        id: order.iter().map(|i| p.id[*i]).collect(),
-        origin: order.iter().map(|i| p.origin[*i]).collect(),
-        position: pick(&p.position),
-        velocity: pick(&p.velocity),
-        ledger: pick(&p.ledger),
-        radius: order.iter().map(|i| p.radius[*i]).collect(),
-        mass: order.iter().map(|i| p.mass[*i]).collect(),
-        totals: p.totals,
-        history: p.history.clone(),
     }
 }

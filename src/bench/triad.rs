@@ -1,32 +1,35 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The machine's own memory bandwidth: a_i = b_i + s c_i on three arrays, as STREAM does.
 
-use std::time::Instant;
+use rustix::time::{ClockId, clock_gettime};
 
-/// GB/s of the triad on `bytes` in all three arrays together; counted: two reads and one write. Best of `times`.
+/// CPU time of the calling thread so far, s.
+pub fn cpu_seconds() -> f64 {
+    let t = clock_gettime(ClockId::ThreadCPUTime);
+    t.tv_sec as f64 + 1e-9 * t.tv_nsec as f64
+}
+
+/// GB/s of the triad on `bytes` in all three arrays together; counted: two reads and one write. CPU time of the slowest
+/// thread, median of `times`.
 pub fn bandwidth(bytes: usize, threads: usize, times: usize) -> f64 {
     let n = (bytes / 24 / threads.max(1)).max(1000);
-    let mut arrays: Vec<_> =
-        (0..threads.max(1)).map(|_| [vec![0.0f64; n], vec![1.0; n], vec![2.0; n]]).collect();
-    let mut best = f64::INFINITY;
-    for k in 0..=times {
-        let s = k as f64;
-        let begin = Instant::now();
-        std::thread::scope(|scope| {
-            let mut rest = arrays.iter_mut();
-            let first = rest.next();
-            rest.for_each(|[a, b, c]| drop(scope.spawn(move || sweep(a, b, c, s))));
-            if let Some([a, b, c]) = first {
-                sweep(a, b, c, s);
-            }
-        });
-        if k > 0 {
-            best = best.min(begin.elapsed().as_secs_f64());
-        }
-    }
-    let sum: f64 = arrays.iter().map(|a| a[0][n / 2]).sum();
-    assert!(sum > 0.0, "the compiler must not drop the loop");
-    (24 * n * threads.max(1)) as f64 / best / 1e9
+    let one = || {
+        let [mut a, b, c] = [vec![0.0f64; n], vec![1.0; n], vec![2.0; n]];
+        let run = |k: usize| {
+            let begin = cpu_seconds();
+            sweep(&mut a, &b, &c, k as f64);
+            cpu_seconds() - begin
+        };
+        let all: Vec<f64> = (0..=times).map(run).skip(1).collect();
+        assert!(a[n / 2] > 0.0, "the compiler must not drop the loop");
+        super::smoother::median(all)
+    };
+    let slowest = std::thread::scope(|scope| {
+        let others: Vec<_> = (1..threads).map(|_| scope.spawn(one)).collect();
+        let mine = one();
+        others.into_iter().map(|t| t.join().unwrap_or(f64::NAN)).fold(mine, f64::max)
+    });
+    (24 * n * threads.max(1)) as f64 / slowest / 1e9
 }
 
 fn sweep(a: &mut [f64], b: &[f64], c: &[f64], s: f64) {

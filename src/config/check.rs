@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! What cannot work, or will surprise: checked across case.toml, the OpenFOAM case and the DEM script.
 
-use super::resolution::{courant, gather_bias, relaxation};
-use super::{Config, Feedback, GravityTreatment, InInterval, Model, Problem, foam, script};
+use super::resolution::{courant, gather_bias, history, relaxation};
+use super::{
+    CoarseGraining, Config, Continuity, Feedback, GravityTreatment, InInterval, Model, Problem, bandwidth,
+    foam, script,
+};
 
 /// All problems of a case, errors first.
 pub fn check(c: &Config) -> Vec<Problem> {
     let mut p = Vec::new();
     values(c, &mut p);
     models(c, &mut p);
+    smoothing(c, &mut p);
     times(c, &mut p);
     let script = script::read(&c.script(), &c.file.dem.variables);
     match &script {
@@ -46,7 +50,15 @@ pub fn check(c: &Config) -> Vec<Problem> {
     if let (Some(mesh), Ok(s)) = (foam::extent(&case), &script) {
         meshes(c, &mesh, s, &mut p);
     }
-    p.sort_by_key(|x| x.severity == super::Severity::Warning);
+    p.sort_by_key(|x| x.severity);
+    p
+}
+
+/// Problems of the settings alone, without the files of a case.
+pub fn settings(c: &Config) -> Vec<Problem> {
+    let mut p = Vec::new();
+    values(c, &mut p);
+    models(c, &mut p);
     p
 }
 
@@ -64,10 +76,17 @@ fn values(c: &Config, p: &mut Vec<Problem>) {
     range("fluid.density", f.fluid.density, 1e-2, 3e4, "kg/m3");
     range("fluid.kinematic_viscosity", f.fluid.kinematic_viscosity, 1e-9, 1e2, "m2/s");
     range("dem.time_step", f.dem.time_step, 1e-12, 1.0, "s");
-    range("dem.coarse_graining", f.dem.coarse_graining, 1.0, 1e3, "");
+    match &f.dem.coarse_graining {
+        CoarseGraining::All(ratio) => range("dem.coarse_graining", *ratio, 1.0, 1e3, ""),
+        CoarseGraining::ByType(table) => {
+            table
+                .iter()
+                .for_each(|(k, ratio)| range(&format!("dem.coarse_graining.{k}"), *ratio, 1.0, 1e3, ""));
+        }
+    }
     range("forces.sphericity", f.forces.sphericity, 0.1, 1.0, "");
     range("forces.switch_voidage", f.forces.switch_voidage, 0.4, 1.0, "");
-    range("forces.added_mass", f.forces.added_mass, 0.0, 5.0, "");
+    range("forces.added_mass", f.forces.added_mass.coefficient(), 0.0, 5.0, "");
     range("forces.particle_stress", f.forces.particle_stress, 0.0, 1e6, "Pa");
     range("forces.particle_stress_exponent", f.forces.particle_stress_exponent, 1.0, 10.0, "");
     range("forces.close_packing", f.forces.close_packing, 0.3, 1.0, "");
@@ -86,7 +105,20 @@ fn values(c: &Config, p: &mut Vec<Problem>) {
     if f.smooth.method != "none" || f.map.method == "kernel" {
         range("smooth.bandwidth", f.smooth.bandwidth, 1e-9, 1e3, "m");
     }
-    for (key, n) in [("run.dem_ranks", f.run.dem_ranks), ("run.cfd_ranks", f.run.cfd_ranks)] {
+    for [d, b] in &f.smooth.by_diameter {
+        range("smooth.by_diameter", *d, 1e-9, 1e2, "m (a diameter)");
+        range("smooth.by_diameter", *b, 1e-9, 1e3, "m (a bandwidth)");
+    }
+    if f.smooth.largest_cell != 0.0 {
+        range("smooth.largest_cell", f.smooth.largest_cell, 1e-9, 1e4, "m");
+    }
+    range("smooth.time", f.smooth.time, 0.0, 1e6, "s");
+    let counts = [
+        ("run.dem_ranks", f.run.dem_ranks),
+        ("run.cfd_ranks", f.run.cfd_ranks),
+        ("run.threads", f.run.threads),
+    ];
+    for (key, n) in counts {
         if n == 0 || n > 100_000 {
             p.push(Problem::error(key, n, "at least 1", format!("{key} = 1")));
         }
@@ -98,6 +130,79 @@ fn values(c: &Config, p: &mut Vec<Problem>) {
             "a number of DEM steps, at least 1",
             "coupling.interval = 20",
         ));
+    }
+    if let CoarseGraining::ByType(table) = &f.dem.coarse_graining {
+        let bad = |k: &&String| !k.parse::<u32>().is_ok_and(|t| (1..1000).contains(&t));
+        if let Some(k) = table.keys().find(bad) {
+            let fix = "dem.coarse_graining = { 1 = 4.0, 2 = 10.0 }";
+            p.push(Problem::error(
+                "dem.coarse_graining",
+                k,
+                "the keys are particle types of the script, from 1",
+                fix,
+            ));
+        }
+        if table.is_empty() {
+            p.push(Problem::error(
+                "dem.coarse_graining",
+                "{}",
+                "no type at all",
+                "dem.coarse_graining = 1.0",
+            ));
+        }
+    }
+}
+
+/// Smoothing beyond one bandwidth for all and the particles of now.
+fn smoothing(c: &Config, p: &mut Vec<Problem>) {
+    let s = &c.file.smooth;
+    let given = || format!("{:?}", s.by_diameter);
+    if !s.by_diameter.is_empty() && s.method == "none" {
+        let fix = "smooth.method = \"chebyshev\"";
+        p.push(Problem::error(
+            "smooth.by_diameter",
+            given(),
+            "nothing is smoothed with method = \"none\"",
+            fix,
+        ));
+    }
+    if s.by_diameter.windows(2).any(|w| w[0][0] >= w[1][0]) {
+        let accepted = "the diameters must ascend: a particle takes the first that is not below its own";
+        let fix = "smooth.by_diameter = [[1e-3, 4e-3], [2e-3, 8e-3]]";
+        p.push(Problem::error("smooth.by_diameter", given(), accepted, fix));
+    }
+    let x = &c.file.coupling;
+    if x.void_velocity == "pinned" && (x.scheme != "implicit" || s.method == "none") {
+        let (accepted, fix) = if x.scheme == "implicit" {
+            (
+                "nothing is smoothed with method = \"none\": no void cell has a source",
+                "smooth.method = \"chebyshev\"",
+            )
+        } else {
+            (
+                "only the scheme implicit looks at the solids velocity of void cells",
+                "coupling.scheme = \"implicit\"",
+            )
+        };
+        p.push(Problem::error("coupling.void_velocity", "pinned", accepted, fix));
+    }
+    if s.time > 0.0 && c.file.coupling.continuity == Continuity::SolidsFlux {
+        let accepted =
+            "the mean solid fraction and the solids flux of now do not fit each other in the continuity";
+        let fix = "coupling.continuity = \"voidage-rate\"";
+        p.push(Problem::error("smooth.time", s.time, accepted, fix));
+    } else if s.time > 0.0 {
+        let model_a = if c.file.coupling.model == Model::A && c.file.coupling.feedback == Feedback::TwoWay {
+            "; in model A the pressure force then breaks the third law (action_reaction_error)"
+        } else {
+            ""
+        };
+        let accepted = format!(
+            "the mean lags: fluid and drag see the solids where they were, and their volume is kept only while none comes or goes \
+             (solid_volume_error of monitor.csv){model_a}"
+        );
+        let fix = "smooth.time = 0, or coupling.model = \"B\"";
+        p.push(Problem::warning("smooth.time", s.time, &accepted, fix));
     }
 }
 
@@ -155,15 +260,20 @@ fn models(c: &Config, p: &mut Vec<Problem>) {
             fix,
         ));
     }
-    if f.forces.added_mass > 0.0 && f.dem.force == InInterval::Constant {
+    if f.forces.added_mass.on() && f.dem.force == InInterval::Constant {
         let accepted =
             "the added mass is part of the particle's inertia: the force cannot be held over the interval";
         p.push(Problem::error(
             "forces.added_mass",
-            f.forces.added_mass,
+            format!("{:?}", f.forces.added_mass),
             accepted,
             "dem.force = \"implicit\"",
         ));
+    }
+    if f.forces.drag == "beetstra-filtered" && !f.dem.coarse_graining.by_type().is_empty() {
+        let accepted = "the filtered law's parcel correction knows one ratio for all particles";
+        let fix = "a number for dem.coarse_graining, or another drag law";
+        p.push(Problem::error("dem.coarse_graining", "by type", accepted, fix));
     }
     let scheme = crate::scheme::by_name(&f.coupling.scheme);
     if two_way && scheme.is_some_and(|s| !s.conservative()) {
@@ -258,8 +368,10 @@ fn dem(c: &Config, s: &script::Script, p: &mut Vec<Problem>) {
                 fix,
             ));
         }
+        bandwidth::advice(c, s, p);
         if let Some(rho) = s.density {
             relaxation(c, r, rho, s.count, p);
+            history(c, r, rho, p);
         }
     }
 }

@@ -2,15 +2,17 @@
 //! The case file: `raw` reads case.toml (unknown keys refused), `check` finds what cannot work.
 //!
 //! `foam` and `script` read the few facts needed from OpenFOAM dictionaries and LIGGGHTS scripts. All problems
-//! are reported at once, each with where, what was given, what is accepted and what to type.
+//! are reported at once, each with where, what was given, what is accepted and what to type. `bandwidth` and
+//! `resolution` put numbers to what is too coarse.
 
+mod bandwidth;
 mod check;
 pub mod foam;
 mod raw;
 mod resolution;
 pub mod script;
 
-pub use check::check;
+pub use check::{check, settings};
 use raw::parse;
 pub use raw::*;
 
@@ -18,12 +20,14 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// How bad a problem is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
     /// The run would fail or be wrong.
     Error,
     /// The run works; the result may surprise.
     Warning,
+    /// A number to judge the case by.
+    Note,
 }
 
 /// A problem of a case.
@@ -59,11 +63,23 @@ impl Problem {
     ) -> Self {
         Self { severity: Severity::Warning, ..Self::error(place, given, accepted, fix) }
     }
+    pub(crate) fn note(
+        place: &str,
+        given: impl fmt::Display,
+        accepted: &str,
+        fix: impl fmt::Display,
+    ) -> Self {
+        Self { severity: Severity::Note, ..Self::error(place, given, accepted, fix) }
+    }
 }
 
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let kind = if self.severity == Severity::Error { "error" } else { "warning" };
+        let kind = match self.severity {
+            Severity::Error => "error",
+            Severity::Warning => "warning",
+            Severity::Note => "note",
+        };
         write!(f, "{kind}: {} = {}: {}; {}", self.place, self.given, self.accepted, self.fix)
     }
 }
@@ -105,7 +121,7 @@ pub fn load(folder: &Path, overrides: &[(String, String)]) -> Result<Config, Vec
     let text = std::fs::read_to_string(&file).map_err(|e| {
         vec![Problem::error(&name, e, "a case is a folder with a case.toml", "voidage run FOLDER")]
     })?;
-    let file = parse(&text, overrides).map_err(|mut p| {
+    let (file, wake) = parse(&text, overrides).map_err(|mut p| {
         p.iter_mut().filter(|p| p.place.is_empty()).for_each(|p| p.place.clone_from(&name));
         p
     })?;
@@ -115,5 +131,23 @@ pub fn load(folder: &Path, overrides: &[(String, String)]) -> Result<Config, Vec
         let fix = "set fluid.case to the OpenFOAM case (folder with system/controlDict)";
         vec![Problem::error("fluid.case", file.fluid.case.display(), &e, fix)]
     })?;
-    Ok(Config { folder, file, control })
+    let mut config = Config { folder, file, control };
+    if wake {
+        config.file.smooth.bandwidth = bandwidth::from_wake(&config).map_err(|p| vec![p])?;
+    }
+    Ok(config)
+}
+
+/// The case of a recording: its text, with overrides; `control` as it ran. Paths lead nowhere.
+pub fn recorded(
+    text: &str,
+    overrides: &[(String, String)],
+    control: foam::Control,
+) -> Result<Config, Vec<Problem>> {
+    let (file, wake) = parse(text, overrides)?;
+    if wake {
+        let fix = "smooth.bandwidth = 0.0048";
+        return Err(vec![Problem::error("smooth.bandwidth", "wake", "a number in m for a recording", fix)]);
+    }
+    Ok(Config { folder: PathBuf::new(), file, control })
 }

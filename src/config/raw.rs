@@ -29,6 +29,8 @@ pub struct CaseFile {
     pub output: Output,
     #[serde(default)]
     pub limits: Limits,
+    #[serde(default)]
+    pub record: Record,
 }
 
 /// Section `run`.
@@ -38,10 +40,11 @@ pub struct CaseFile {
 pub struct Run {
     pub dem_ranks: u32,
     pub cfd_ranks: u32,
+    pub threads: u32,
 }
 impl Default for Run {
     fn default() -> Self {
-        Self { dem_ranks: 1, cfd_ranks: 1 }
+        Self { dem_ranks: 1, cfd_ranks: 1, threads: 1 }
     }
 }
 
@@ -112,6 +115,67 @@ fn liggghts() -> String {
     "liggghts".into()
 }
 
+/// Parcel diameter / primary diameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "dem.coarse_graining: a number, or one for each particle type: { 1 = 4.0, 2 = 10.0 }"
+)]
+pub enum CoarseGraining {
+    /// of all particles
+    All(f64),
+    /// by type
+    ByType(BTreeMap<String, f64>),
+}
+impl Default for CoarseGraining {
+    fn default() -> Self {
+        Self::All(1.0)
+    }
+}
+impl CoarseGraining {
+    /// Of all particles; 1 if it differs by type.
+    pub fn of_all(&self) -> f64 {
+        if let Self::All(ratio) = self { *ratio } else { 1.0 }
+    }
+    /// Index: type; NaN: no ratio was given for it. Empty if all particles have the same.
+    pub fn by_type(&self) -> Vec<f64> {
+        let Self::ByType(table) = self else { return Vec::new() };
+        let known: BTreeMap<usize, f64> =
+            table.iter().filter_map(|(k, ratio)| Some((k.parse().ok()?, *ratio))).collect();
+        let types = known.keys().max().map_or(0, |t| t + 1).min(1000);
+        (0..types).map(|t| known.get(&t).copied().unwrap_or(f64::NAN)).collect()
+    }
+}
+
+/// Coefficient of the added mass.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "forces.added_mass: a number, or \"felderhof\"")]
+pub enum AddedMass {
+    /// the same for all particles
+    Coefficient(f64),
+    /// a law
+    Law(String),
+}
+impl Default for AddedMass {
+    fn default() -> Self {
+        Self::Coefficient(0.0)
+    }
+}
+impl AddedMass {
+    /// 0 where a law gives it.
+    pub fn coefficient(&self) -> f64 {
+        if let Self::Coefficient(c) = self { *c } else { 0.0 }
+    }
+    /// A law gives it.
+    pub fn law(&self) -> bool {
+        matches!(self, Self::Law(_))
+    }
+    /// Is there any?
+    pub fn on(&self) -> bool {
+        self.law() || self.coefficient() > 0.0
+    }
+}
+
 /// Section `dem`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -123,8 +187,8 @@ pub struct Dem {
     pub time_step: f64,
     #[serde(default = "implicit")]
     pub force: InInterval,
-    #[serde(default = "one")]
-    pub coarse_graining: f64,
+    #[serde(default)]
+    pub coarse_graining: CoarseGraining,
     #[serde(default)]
     pub variables: BTreeMap<String, String>,
 }
@@ -161,6 +225,9 @@ fn model_a() -> Model {
 fn two_way() -> Feedback {
     Feedback::TwoWay
 }
+fn kernel() -> String {
+    "kernel".into()
+}
 fn voidage_rate() -> Continuity {
     Continuity::VoidageRate
 }
@@ -179,6 +246,8 @@ pub struct Coupling {
     pub feedback: Feedback,
     #[serde(default = "voidage_rate")]
     pub continuity: Continuity,
+    #[serde(default = "kernel")]
+    pub void_velocity: String,
 }
 
 /// Section `map`.
@@ -213,6 +282,12 @@ pub struct Smooth {
     pub bandwidth: f64,
     #[serde(default = "tolerance")]
     pub tolerance: f64,
+    #[serde(default)]
+    pub by_diameter: Vec<[f64; 2]>,
+    #[serde(default)]
+    pub largest_cell: f64,
+    #[serde(default)]
+    pub time: f64,
 }
 
 /// Section `interpolate`.
@@ -268,7 +343,11 @@ pub struct Forces {
     #[serde(default = "none")]
     pub lift: String,
     #[serde(default)]
-    pub added_mass: f64,
+    pub added_mass: AddedMass,
+    #[serde(default)]
+    pub history: bool,
+    #[serde(default)]
+    pub torque: bool,
     #[serde(default)]
     pub particle_stress: f64,
     #[serde(default = "three")]
@@ -308,11 +387,43 @@ impl Default for Limits {
     }
 }
 
+/// How recorded messages are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)]
+pub enum Compression {
+    None,
+    Lz4,
+}
+
+/// Section `record`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs)]
+pub struct Record {
+    pub every: u32,
+    pub first: u32,
+    pub last: u32,
+    pub file: PathBuf,
+    pub compression: Compression,
+}
+impl Default for Record {
+    fn default() -> Self {
+        Self { every: 0, first: 0, last: 0, file: "recording.voidage".into(), compression: Compression::Lz4 }
+    }
+}
+
 /// Reference of all keys: key, unit, default ("-" = must be given), meaning.
 pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("format", "", "-", "version of this file, 1"),
     ("run.dem_ranks", "", "1", "MPI ranks of the particle program"),
     ("run.cfd_ranks", "", "1", "MPI ranks of the fluid solver; the case is decomposed when needed"),
+    (
+        "run.threads",
+        "",
+        "1",
+        "threads of the coupler; the results do not depend on them. The partners wait meanwhile, so their cores are free",
+    ),
     ("fluid.case", "", "fluid", "OpenFOAM case, below the case folder"),
     ("fluid.solver", "", "voidageFoam", "voidageFoam, or a stock solver with fvOptions (dilute, model B)"),
     ("fluid.density", "kg/m3", "-", "density of the fluid"),
@@ -330,7 +441,12 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("dem.script", "", "-", "its input script"),
     ("dem.time_step", "s", "-", "must equal `timestep` of the script"),
     ("dem.force", "", "implicit", "implicit (K(u-v)+f in each DEM step) | constant"),
-    ("dem.coarse_graining", "", "1", "parcel diameter / primary diameter: drag of the primary x ratio^3"),
+    (
+        "dem.coarse_graining",
+        "",
+        "1",
+        "parcel diameter / primary diameter: forces of the primary x ratio^3; or by particle type: { 1 = 4.0, 2 = 10.0 }",
+    ),
     ("dem.variables", "", "{}", "passed as -var name value"),
     ("coupling.interval", "DEM steps", "-", "fluid step = interval x dem.time_step"),
     (
@@ -342,6 +458,12 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("coupling.model", "", "A", "A | B: split of pressure gradient and stress"),
     ("coupling.feedback", "", "two-way", "two-way | one-way"),
     ("coupling.continuity", "", "voidage-rate", "voidage-rate (d eps/dt) | solids-flux (SX eq. 2a)"),
+    (
+        "coupling.void_velocity",
+        "",
+        "kernel",
+        "implicit: solids velocity of cells void of particles: kernel (mean) | pinned (continued from filled cells held fixed, R)",
+    ),
     (
         "map.method",
         "",
@@ -356,12 +478,35 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
         "chebyshev",
         "chebyshev | chebyshev-u | uniformization (positive by proof) | crank-nicolson | crank-nicolson-1 | backward-euler | constdiff | direct | none",
     ),
-    ("smooth.bandwidth", "m", "-", "b of the Gaussian exp(-r2/b2); 4 to 6 particle diameters"),
+    (
+        "smooth.bandwidth",
+        "m",
+        "-",
+        "b of the Gaussian exp(-r2/b2); 4 to 6 particle diameters, or \"wake\": from the particles' wake, see `voidage check`",
+    ),
     (
         "smooth.tolerance",
         "",
         "1e-2",
         "error of the smoothing operator; below 1e-2 the deposit's own error dominates",
+    ),
+    (
+        "smooth.by_diameter",
+        "m",
+        "[]",
+        "[[d1, b1], [d2, b2], ...]: particles up to diameter d1 are smoothed with b1 and so on, larger ones with bandwidth",
+    ),
+    (
+        "smooth.largest_cell",
+        "m",
+        "0",
+        "cells larger than this (cube root of the volume) are not smoothed; 0: all are",
+    ),
+    (
+        "smooth.time",
+        "s",
+        "0",
+        "running mean of eps_s over this time (SX eqs. 11 to 14); it lags, so solid volume is not conserved; 0: off",
     ),
     ("interpolate.fluid_velocity", "", "gather", "gather | host-cell | linear"),
     (
@@ -379,7 +524,14 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("forces.filter_diameter", "m", "0", "beetstra-filtered: primary diameter of its terminal velocity"),
     ("forces.filter_density", "kg/m3", "0", "beetstra-filtered: particle density of its terminal velocity"),
     ("forces.lift", "", "none", "none | saffman-mei | loth"),
-    ("forces.added_mass", "", "0", "coefficient of the added mass, 0.5 for a sphere alone; 0: off"),
+    (
+        "forces.added_mass",
+        "",
+        "0",
+        "coefficient of the added mass, 0.5 for a sphere alone; 0: off; \"felderhof\": by solid fraction and density ratio",
+    ),
+    ("forces.history", "", "false", "Basset's history force with bounded memory, kept with the particle"),
+    ("forces.torque", "", "false", "torque of the fluid's rotation on the particles, K_w (curl U / 2 - w)"),
     ("forces.particle_stress", "Pa", "0", "MP-PIC stress (Snider) for parcels without contacts; 0: off"),
     ("forces.particle_stress_exponent", "", "3", "its exponent, 2 to 5"),
     ("forces.close_packing", "", "0.63", "its solid fraction at close packing"),
@@ -392,6 +544,16 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
         "2",
         "restart sets kept, written at the fluid's write times (voidage run --restart); 0: none",
     ),
+    (
+        "record.every",
+        "",
+        "0",
+        "record every n-th exchange; 1: all; 0: none (voidage replay, inspect, export)",
+    ),
+    ("record.first", "", "0", "record the first n exchanges as well"),
+    ("record.last", "", "0", "record the last n exchanges before endTime as well"),
+    ("record.file", "", "recording.voidage", "the file, below the case folder; never overwritten"),
+    ("record.compression", "", "none", "none | lz4: a third smaller, for 4 ms of CPU per 2.6 MB"),
     ("limits.wait", "s", "60", "longest wait for a peer"),
     ("limits.outside", "", "error", "error | exclude: particles outside the mesh"),
     ("limits.voidage_min", "", "0", "cap the voidage from below (counted); 0: stop the run instead"),
@@ -418,8 +580,9 @@ pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) 
     (best.0 <= name.len() / 2 + 1).then_some(best.1)
 }
 
-/// Parses and applies overrides. Problems without a place are about the file itself.
-pub(super) fn parse(text: &str, overrides: &[(String, String)]) -> Result<CaseFile, Vec<Problem>> {
+/// Parses and applies overrides; true: the bandwidth is to be taken from the wake. Problems without a place are about
+/// the file itself.
+pub(super) fn parse(text: &str, overrides: &[(String, String)]) -> Result<(CaseFile, bool), Vec<Problem>> {
     let syntax = |e: toml::de::Error| {
         let line = e.span().map(|s| text[..s.start.min(text.len())].lines().count().max(1));
         let given = line.map(|l| format!("line {l}")).unwrap_or_default();
@@ -433,11 +596,30 @@ pub(super) fn parse(text: &str, overrides: &[(String, String)]) -> Result<CaseFi
     if !unknown.is_empty() {
         return Err(unknown);
     }
+    let wake = bandwidth_word(&mut table)?;
     let file = CaseFile::deserialize(table).map_err(|e| {
         vec![Problem::error("", "its content", &e.message().replace('\n', " "), "see `voidage explain`")]
     })?;
     let problems = names(&file);
-    if problems.is_empty() { Ok(file) } else { Err(problems) }
+    if problems.is_empty() { Ok((file, wake)) } else { Err(problems) }
+}
+
+/// A word in the place of the bandwidth: "wake", to be replaced by a number later.
+fn bandwidth_word(table: &mut toml::Table) -> Result<bool, Vec<Problem>> {
+    let smooth = table.get_mut("smooth").and_then(toml::Value::as_table_mut);
+    let Some(value) = smooth.and_then(|t| t.get_mut("bandwidth")) else { return Ok(false) };
+    match value.as_str() {
+        None => Ok(false),
+        Some("wake") => {
+            *value = toml::Value::Float(0.0);
+            Ok(true)
+        }
+        Some(other) => {
+            let given = format!("\"{other}\"");
+            let fix = "smooth.bandwidth = \"wake\"";
+            Err(vec![Problem::error("smooth.bandwidth", given, "accepted: a number (m), or \"wake\"", fix)])
+        }
+    }
 }
 
 fn set(table: &mut toml::Table, key: &str, value: &str) -> Result<(), Vec<Problem>> {
@@ -490,11 +672,15 @@ fn names(file: &CaseFile) -> Vec<Problem> {
     let lifts = ["none"].into_iter().chain(forces::lift::all().iter().map(|l| l.name()));
     check("forces.lift", &file.forces.lift, lifts.collect());
     check("coupling.scheme", &file.coupling.scheme, scheme::all().iter().map(|s| s.name()).collect());
+    check("coupling.void_velocity", &file.coupling.void_velocity, vec!["kernel", "pinned"]);
     check("map.method", &file.map.method, map::all().iter().map(|m| m.name()).collect());
     check("smooth.method", &file.smooth.method, smooth::NAMES.to_vec());
     check("interpolate.fluid_velocity", &file.interpolate.fluid_velocity, FluidVelocity::NAMES.to_vec());
     check("limits.outside", &file.limits.outside, vec!["error", "exclude"]);
     check("output.picture", &file.output.picture, vec!["none", "x", "y", "z"]);
     check("dem.program", &file.dem.program, vec!["liggghts"]);
+    if let AddedMass::Law(law) = &file.forces.added_mass {
+        check("forces.added_mass", law, vec!["felderhof"]);
+    }
     problems
 }

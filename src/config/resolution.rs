@@ -3,6 +3,7 @@
 //! the bias of the gathered fluid velocity as a number. Called by `check`; reads what case and script say.
 
 use super::{Config, InInterval, Problem, foam, script};
+use crate::forces::history::explicit_ratio;
 
 /// Fluid and DEM step against the relaxation times τ_p = ρ_p d²/(18 η) and τ_f = τ_p ρ_f (1 − φ)/(ρ_p φ) (Stokes).
 /// `count`: particles in the mesh, if known; else φ is that of a packed bed.
@@ -83,5 +84,30 @@ pub fn gather_bias(c: &Config, mesh: &foam::Extent, s: &script::Script, p: &mut 
         let fix =
             format!("interpolate.fluid_velocity = \"linear\", or smooth.bandwidth = {:.1e}", 0.15 * gap);
         p.push(Problem::warning("smooth.bandwidth", b, &accepted, fix));
+    }
+}
+
+/// The explicit history force against the particle's inertia.
+pub fn history(c: &Config, radius: f64, density: f64, p: &mut Vec<Problem>) {
+    if !c.file.forces.history {
+        return;
+    }
+    let f = &c.file.fluid;
+    let of = |ratio: f64| {
+        explicit_ratio(2.0 * radius / ratio, f.density, density, f.kinematic_viscosity, c.period())
+    };
+    let ratios =
+        c.file.dem.coarse_graining.by_type().into_iter().chain([c.file.dem.coarse_graining.of_all()]);
+    let worst = ratios.filter(|r| *r >= 1.0).map(of).fold(0.0, f64::max);
+    // the newest part goes with the square root of the step
+    let step = c.period() * (0.5 / worst).powi(2);
+    let accepted = format!(
+        "the explicit history force answers a change of slip by {worst:.2} of it a fluid step later; it is stable below 1"
+    );
+    let fix = format!("a fluid step of at most {step:.1e} s, or forces.history = false");
+    if worst >= 1.0 {
+        p.push(Problem::error("forces.history", true, &accepted, fix));
+    } else if worst > 0.5 {
+        p.push(Problem::warning("forces.history", true, &accepted, fix));
     }
 }

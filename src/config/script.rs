@@ -17,6 +17,8 @@ pub struct Script {
     pub boundary: Option<[String; 3]>,
     /// particles of the data file
     pub count: Option<f64>,
+    /// file of `read_data`
+    pub data: Option<std::path::PathBuf>,
     pub has_fix: bool,
     pub has_run: bool,
     /// takes particles from a restart file
@@ -53,9 +55,22 @@ pub fn read(path: &Path, given: &BTreeMap<String, String>) -> Result<Script, Str
                 let file = w.get(1).map(|f| path.parent().unwrap_or(Path::new(".")).join(f));
                 s.domain = file.as_ref().and_then(|f| data_box(f));
                 s.count = file.as_ref().and_then(|f| data_count(f));
+                if let Some((radius, density)) = file.as_ref().and_then(|f| data_spheres(f)) {
+                    (s.radius, s.density) = (s.radius.or(Some(radius)), s.density.or(Some(density)));
+                }
+                s.data = file;
             }
             Some("read_restart") => s.has_restart = true,
             Some("fix") if w.get(3) == Some(&"voidage") => s.has_fix = true,
+            Some("fix") if w.get(3) == Some(&"particletemplate/sphere") => {
+                let constant = |key: &str| {
+                    let at = w.windows(2).position(|p| p == [key, "constant"])?;
+                    n(at + 2)
+                };
+                // of several, the largest
+                s.radius = constant("radius").into_iter().chain(s.radius).max_by(f64::total_cmp);
+                s.density = constant("density").or(s.density);
+            }
             Some("run" | "rerun") => s.has_run = true,
             Some("set") if line.contains("density") || line.contains("diameter") => {
                 let after = |key: &str| w.iter().position(|x| *x == key).and_then(|i| n(i + 1));
@@ -90,6 +105,19 @@ fn data_count(path: &Path) -> Option<f64> {
     text.lines().take(40).find_map(|l| l.trim().strip_suffix("atoms")?.trim().parse().ok())
 }
 
+/// Mean diameter (m) and density (kg/m3) of a data file of `atom_style granular` (id type diameter density x y z).
+pub fn spheres(path: &Path) -> Option<(f64, f64)> {
+    let text = std::fs::read_to_string(path).ok()?;
+    let rows = text.lines().skip_while(|l| !l.starts_with("Atoms")).skip(1).filter(|l| !l.trim().is_empty());
+    let rows = rows.map_while(|l| {
+        let v: Vec<f64> = l.split_whitespace().map_while(|w| w.parse().ok()).collect();
+        (v.len() >= 7).then(|| (v[2], v[3]))
+    });
+    let (mut d, mut rho, mut n) = (0.0, 0.0, 0.0);
+    rows.for_each(|r| (d, rho, n) = (d + r.0, rho + r.1, n + 1.0));
+    (n > 0.0 && d > 0.0 && rho > 0.0).then(|| (d / n, rho / n))
+}
+
 /// "lo hi xlo xhi" lines at the head of a data file.
 fn data_box(path: &Path) -> Option<([f64; 3], [f64; 3])> {
     let text = std::fs::read_to_string(path).ok()?;
@@ -100,4 +128,17 @@ fn data_box(path: &Path) -> Option<([f64; 3], [f64; 3])> {
     };
     let (x, y, z) = (axis("x")?, axis("y")?, axis("z")?);
     Some(([x.0, y.0, z.0], [x.1, y.1, z.1]))
+}
+
+/// Sauter radius Σ r³/Σ r² (m) and mean density (kg/m3) of the atoms (style granular: id type diameter density x y z).
+fn data_spheres(path: &Path) -> Option<(f64, f64)> {
+    let text = std::fs::read_to_string(path).ok()?;
+    let section = text.lines().skip_while(|l| l.split_whitespace().next() != Some("Atoms")).skip(1);
+    let rows = section.map(|l| l.split_whitespace().map_while(|w| w.parse().ok()).collect::<Vec<f64>>());
+    let (mut cubes, mut squares, mut mass) = (0.0, 0.0, 0.0);
+    for row in rows.skip_while(Vec::is_empty).take_while(|r| r.len() >= 7) {
+        let d = row[2];
+        (cubes, squares, mass) = (cubes + d * d * d, squares + d * d, mass + d * d * d * row[3]);
+    }
+    (squares > 0.0 && cubes > 0.0).then(|| (0.5 * cubes / squares, mass / cubes))
 }

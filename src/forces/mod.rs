@@ -169,7 +169,7 @@ mod tests {
         let slips: Vec<Slip> = (0..64)
             .map(|i| Slip {
                 diameter: 1e-3,
-                voidage: 0.4 + 0.009 * f64::from(i),
+                voidage: 0.4 + 0.027 * f64::from(i / 3),
                 speed: 0.03 * f64::from(i),
                 kinematic_viscosity: 1e-5,
                 density: 1.2,

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Torque of the fluid on a spinning sphere: T = K_ω (½ ∇ × U − ω), K_ω in N m s. Linear momentum is not touched.
-//! A law with its tests; no case can switch it on yet.
+//! Torque of the fluid on a spinning sphere: T = K_ω (½ ∇ × U − ω), K_ω in N m s.
+//!
+//! Reads the fluid's gradient and the spin (rad/s); the particle program applies the torque with its current ω in every
+//! step of its own (explicit for K_ω Δt/I ≤ 0.2, else exactly relaxing, as the drag). Linear momentum is not touched and
+//! the third law of the books is that of linear momentum; the couple on the fluid is not given back, as in the peers: in
+//! cells larger than a particle it is below what the mesh resolves. A parcel of diameter ratio r turns as its primaries do:
+//! K_ω of the primary × r⁵, as its moment of inertia.
 
 use crate::sums::norm;
 use std::f64::consts::PI;

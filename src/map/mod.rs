@@ -34,7 +34,7 @@ pub struct Options {
 }
 
 /// A way to distribute particles over cells.
-pub trait Mapping {
+pub trait Mapping: Send + Sync {
     /// Name in case.toml.
     fn name(&self) -> &'static str;
     /// Paper and equation.

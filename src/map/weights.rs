@@ -4,11 +4,13 @@
 //! Particle i goes to cell k by m_ik, Σ_k m_ik = 1. Reads and writes cell fields of eight lanes; does not know
 //! what they mean nor where the weights come from.
 
+use crate::arrange::Order;
 use crate::mesh::{Mesh, NONE};
 use crate::step::Lanes;
+use crate::threads;
 
 /// Weights of all particles: particle i goes to `cell[k]` by `weight[k]`, k from `start[i]` to `start[i+1]`; or,
-/// with `start` and `weight` empty, each wholly to `cell[i]` (`NONE`: to none).
+/// with `start` and `weight` empty, each wholly to its host `cell[i]` (`NONE`: to none).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Weights {
     /// first entry of each particle; one more at the end
@@ -42,41 +44,44 @@ impl Weights {
     pub fn reached<'a>(&'a self, occupied: &'a [u32]) -> &'a [u32] {
         if self.whole() { occupied } else { &self.cell }
     }
-    /// Adds Σ_i m_ik q_i / V_k to each cell, particle by particle in the order given (by host cell, then id).
-    #[inline(always)]
-    pub fn deposit(
+    /// Adds Σ_i m_ik q_i / V_k to each cell, particle by particle in their order; the table must lie in it. `quantity`
+    /// also gets what its piece of the particles adds up; returned by piece.
+    pub fn deposit<A: Default + Send>(
         &self,
         mesh: &Mesh,
-        order: &[u32],
+        order: &Order,
         lanes: &mut [Lanes],
-        mut quantity: impl FnMut(usize) -> Lanes,
-    ) {
+        quantity: impl Fn(usize, &mut A) -> Lanes + Sync,
+    ) -> Vec<A> {
         if !self.whole() {
-            for i in order.iter().map(|i| *i as usize) {
-                let q = quantity(i);
-                for (cell, m) in self.entries(i) {
-                    let (to, share) = (&mut lanes[cell], m / mesh.volume[cell]);
-                    (0..8).for_each(|a| to[a] += share * q[a]);
+            // neighbouring pieces share cells
+            let piece = |particles: std::ops::Range<usize>| {
+                let mut all = A::default();
+                for i in particles {
+                    let q = quantity(i, &mut all);
+                    for (cell, m) in self.entries(i) {
+                        let (to, share) = (&mut lanes[cell], m / mesh.volume[cell]);
+                        (0..8).for_each(|a| to[a] += share * q[a]);
+                    }
                 }
-            }
-            return;
+                all
+            };
+            return order.pieces.iter().map(|p| p.particles.clone()).map(piece).collect();
         }
-        let (mut now, mut sum) = (NONE, [0.0; 8]);
-        let mut close = |cell: u32, sum: &Lanes| {
-            if cell != NONE {
-                let (to, v) = (&mut lanes[cell as usize], mesh.volume[cell as usize]);
+        let parts = threads::cut(lanes, order.pieces.iter().map(|p| p.slots.end));
+        threads::map(order.pieces.iter().zip(parts).collect(), |(piece, part)| {
+            let mut all = A::default();
+            for k in piece.cells.clone() {
+                let (cell, mut sum) = (order.occupied[k] as usize, [0.0; 8]);
+                for i in order.start[k] as usize..order.start[k + 1] as usize {
+                    let q = quantity(i, &mut all);
+                    (0..8).for_each(|a| sum[a] += q[a]);
+                }
+                let (to, v) = (&mut part[cell - piece.slots.start], mesh.volume[cell]);
                 (0..8).for_each(|a| to[a] += sum[a] / v);
             }
-        };
-        for i in order.iter().map(|i| *i as usize) {
-            if self.cell[i] != now {
-                close(now, &sum);
-                (now, sum) = (self.cell[i], [0.0; 8]);
-            }
-            let q = quantity(i);
-            (0..8).for_each(|a| sum[a] += q[a]);
-        }
-        close(now, &sum);
+            all
+        })
     }
     /// Σ_k m_ik φ_k of particle i.
     #[inline(always)]

@@ -117,7 +117,7 @@ impl MeshPiece {
         if self.face_starts.len() != faces + 1 || self.neighbour.len() > faces {
             return fail(format!("{faces} owners, {} face starts", self.face_starts.len()));
         }
-        let increasing = self.face_starts.windows(2).all(|w| w[0] + 3 <= w[1]);
+        let increasing = self.face_starts.windows(2).all(|w| w[0].checked_add(3).is_some_and(|e| e <= w[1]));
         if !increasing || self.face_starts.last().is_some_and(|e| *e as usize != self.face_points.len()) {
             return fail("face lists are damaged (a face needs three points)".into());
         }
@@ -132,10 +132,10 @@ impl MeshPiece {
         }
         let mut next = self.neighbour.len();
         for p in &self.patches {
-            if p.size > 0 && p.start != next || p.start + p.size > faces.max(p.start) {
+            if p.size > 0 && p.start != next || p.start.saturating_add(p.size) > faces.max(p.start) {
                 return fail(format!("patch {} starts at face {}, {next} is due", p.name, p.start));
             }
-            next += p.size;
+            next = next.saturating_add(p.size);
         }
         if next != faces { fail(format!("patches cover {next} of {faces} faces")) } else { Ok(()) }
     }

@@ -88,7 +88,7 @@ impl Camera {
         Self { axis, frames: Vec::new(), fastest: 0.0 }
     }
 
-    /// Draws the particles in a box; the farthest first.
+    /// Draws the particles in a box; the nearest first, what they hide not at all.
     pub fn take(&mut self, time: f64, bounds: [[f64; 3]; 2], p: &Particles) {
         // right and up: x-y seen along z, y-z along x, x-z along y
         let (right, up, depth) = [(1, 2, 0), (0, 2, 1), (0, 1, 2)][self.axis];
@@ -108,7 +108,8 @@ impl Camera {
             self.fastest = self.fastest.max(0.5);
         }
         let mut order: Vec<usize> = (0..p.len()).collect();
-        order.sort_by(|a, b| p.position[*a][depth].total_cmp(&p.position[*b][depth]));
+        order.sort_by(|a, b| p.position[*b][depth].total_cmp(&p.position[*a][depth]));
+        let mut seen = vec![false; width * height];
         for i in order {
             let x = (p.position[i][right] - bounds[0][right]) * scale;
             let y = (height - LEGEND) as f64 - (p.position[i][up] - bounds[0][up]) * scale;
@@ -117,9 +118,15 @@ impl Camera {
             let base = colour(speeds[i] / self.fastest);
             for py in (y - r).floor() as i64..=(y + r).ceil() as i64 {
                 for px in (x - r).floor() as i64..=(x + r).ceil() as i64 {
+                    let inside =
+                        px >= 0 && py >= 0 && (px as usize) < width && (py as usize) < height - LEGEND;
+                    if !inside || seen[py as usize * width + px as usize] {
+                        continue;
+                    }
                     let (dx, dy) = ((px as f64 + 0.5 - x) / r, (py as f64 + 0.5 - y) / r);
                     let d2 = dx * dx + dy * dy;
-                    if d2 <= 1.0 && (py as usize) < height - LEGEND {
+                    if d2 <= 1.0 {
+                        seen[py as usize * width + px as usize] = true;
                         let light = (0.55 + 0.45 * (1.0 - d2).sqrt()) * (0.6 + 0.4 * near.clamp(0.0, 1.0));
                         let glint = 60.0 * (1.0 - ((dx + 0.35).powi(2) + (dy + 0.35).powi(2)) * 4.0).max(0.0);
                         f.put(px, py, base.map(|c| (c * light + glint).min(255.0) as u8));

@@ -85,6 +85,10 @@ impl Sum64 {
             self.word(u64::from_le_bytes(w));
         }
     }
+    /// As a number.
+    pub fn value(self) -> u64 {
+        self.0
+    }
     /// As text.
     pub fn text(self) -> String {
         format!("{:016x}", self.0)
@@ -199,6 +203,8 @@ pub struct Sets {
     case: PathBuf,
     keep: u32,
     head: State,
+    /// false: names are given, nothing is written
+    real: bool,
 }
 
 impl Sets {
@@ -211,7 +217,17 @@ impl Sets {
             cfd_ranks: f.run.cfd_ranks,
             ..State::default()
         };
-        (f.output.restarts > 0).then(|| Self { case: c.folder.clone(), keep: f.output.restarts, head })
+        (f.output.restarts > 0).then(|| Self {
+            case: c.folder.clone(),
+            keep: f.output.restarts,
+            head,
+            real: true,
+        })
+    }
+
+    /// Names sets as the run did, and writes none: for a replay.
+    pub fn named_only(c: &Config) -> Option<Self> {
+        Self::new(c).map(|s| Self { real: false, ..s })
     }
 
     /// Makes room for a set: its folder, below the case.
@@ -219,6 +235,9 @@ impl Sets {
         let digits: f64 = format!("{time:.11e}").parse().unwrap_or(time);
         let set = PathBuf::from("voidage/restart").join(digits.to_string());
         let whole = self.case.join(&set);
+        if !self.real {
+            return Ok(set);
+        }
         if whole.exists() {
             fs::remove_dir_all(&whole)?;
         }
@@ -228,6 +247,9 @@ impl Sets {
 
     /// Completes a set after the DEM has written its file, and removes old ones.
     pub fn finish(&self, set: &Path, state: State) -> io::Result<()> {
+        if !self.real {
+            return Ok(());
+        }
         let whole = self.case.join(set);
         let size = fs::metadata(whole.join(PARTICLES))?.len();
         let (h, mut state) = (&self.head, state);

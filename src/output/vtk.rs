@@ -60,35 +60,38 @@ impl Series {
 }
 
 /// Appended blocks: header text with offsets, then the bytes.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Appended {
     bytes: Vec<u8>,
 }
 
 impl Appended {
-    fn array(&mut self, name: &str, kind: &str, components: usize, data: &[u8]) -> String {
+    fn array<const B: usize>(
+        &mut self,
+        name: &str,
+        kind: &str,
+        components: usize,
+        data: impl Iterator<Item = [u8; B]>,
+    ) -> String {
         let offset = self.bytes.len();
-        self.bytes.extend((data.len() as u64).to_le_bytes());
-        self.bytes.extend(data);
+        self.bytes.extend([0; 8]);
+        data.for_each(|x| self.bytes.extend_from_slice(&x));
+        let length = (self.bytes.len() - offset - 8) as u64;
+        self.bytes[offset..offset + 8].copy_from_slice(&length.to_le_bytes());
         format!(
             "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"appended\" offset=\"{offset}\"/>\n"
         )
     }
     fn integers(&mut self, name: &str, data: impl Iterator<Item = i64>) -> String {
-        let bytes: Vec<u8> = data.flat_map(i64::to_le_bytes).collect();
-        self.array(name, "Int64", 1, &bytes)
+        self.array(name, "Int64", 1, data.map(i64::to_le_bytes))
     }
     fn floats(&mut self, name: &str, data: &Data) -> String {
-        match data {
-            Data::Scalar(v) => {
-                let bytes: Vec<u8> = v.iter().flat_map(|x| (*x as f32).to_le_bytes()).collect();
-                self.array(name, "Float32", 1, &bytes)
-            }
-            Data::Vector(v) => {
-                let bytes: Vec<u8> = v.iter().flatten().flat_map(|x| (*x as f32).to_le_bytes()).collect();
-                self.array(name, "Float32", 3, &bytes)
-            }
-        }
+        let (components, numbers) = match data {
+            Data::Scalar(v) => (1, *v),
+            Data::Vector(v) => (3, v.as_flattened()),
+        };
+        self.bytes.reserve(4 * numbers.len() + 8);
+        self.array(name, "Float32", components, numbers.iter().map(|x| (*x as f32).to_le_bytes()))
     }
     fn finish(self, file: &mut dyn Write, kind: &str, body: &str) -> io::Result<()> {
         write!(
@@ -101,45 +104,60 @@ impl Appended {
     }
 }
 
-/// Cells with fields.
-pub fn cells(file: &mut dyn Write, mesh: &Mesh, fields: &[(&str, Data)]) -> io::Result<()> {
-    let mut a = Appended::default();
-    let n = mesh.len();
-    let corners = |slot| {
-        let mut c: Vec<u32> = mesh.loops(slot).flatten().copied().collect();
-        c.sort_unstable();
-        c.dedup();
-        c
-    };
-    let offsets = |lengths: Vec<usize>| {
-        lengths.into_iter().scan(0i64, |sum, l| {
-            *sum += l as i64;
-            Some(*sum)
-        })
-    };
-    let stream = |slot| 1 + mesh.loops(slot).map(|f| 1 + f.len()).sum::<usize>();
-    let points = &mesh.faces.points;
-    let mut body = format!("<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{n}\">\n<Points>\n", points.len());
-    body += &a.floats("Points", &Data::Vector(points));
-    body += "</Points>\n<Cells>\n";
-    body += &a.integers("connectivity", (0..n).flat_map(corners).map(i64::from));
-    body += &a.integers("offsets", offsets((0..n).map(|c| corners(c).len()).collect()));
-    body += &a.array("types", "UInt8", 1, &vec![42; n]);
-    let faces = (0..n).flat_map(|slot| {
-        let list = |f: &[u32]| {
-            std::iter::once(f.len() as i64).chain(f.iter().map(|p| i64::from(*p))).collect::<Vec<_>>()
+/// The part of a .vtu file that stays the same: points and cells.
+pub struct Grid {
+    body: String,
+    appended: Appended,
+}
+
+impl Grid {
+    /// Cells as polyhedra.
+    pub fn new(mesh: &Mesh) -> Self {
+        let mut a = Appended::default();
+        let n = mesh.len();
+        let corners = |slot| {
+            let mut c: Vec<u32> = mesh.loops(slot).flatten().copied().collect();
+            c.sort_unstable();
+            c.dedup();
+            c
         };
-        std::iter::once(mesh.loops(slot).count() as i64)
-            .chain(mesh.loops(slot).flat_map(list).collect::<Vec<_>>())
-    });
-    body += &a.integers("faces", faces);
-    body += &a.integers("faceoffsets", offsets((0..n).map(stream).collect()));
-    body += "</Cells>\n<CellData>\n";
-    for (name, data) in fields {
-        body += &a.floats(name, data);
+        let offsets = |lengths: Vec<usize>| {
+            lengths.into_iter().scan(0i64, |sum, l| {
+                *sum += l as i64;
+                Some(*sum)
+            })
+        };
+        let stream = |slot| 1 + mesh.loops(slot).map(|f| 1 + f.len()).sum::<usize>();
+        let points = &mesh.faces.points;
+        let mut body =
+            format!("<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{n}\">\n<Points>\n", points.len());
+        body += &a.floats("Points", &Data::Vector(points));
+        body += "</Points>\n<Cells>\n";
+        body += &a.integers("connectivity", (0..n).flat_map(corners).map(i64::from));
+        body += &a.integers("offsets", offsets((0..n).map(|c| corners(c).len()).collect()));
+        body += &a.array("types", "UInt8", 1, std::iter::repeat_n([42], n));
+        let faces = (0..n).flat_map(|slot| {
+            let list = |f: &[u32]| {
+                std::iter::once(f.len() as i64).chain(f.iter().map(|p| i64::from(*p))).collect::<Vec<_>>()
+            };
+            std::iter::once(mesh.loops(slot).count() as i64)
+                .chain(mesh.loops(slot).flat_map(list).collect::<Vec<_>>())
+        });
+        body += &a.integers("faces", faces);
+        body += &a.integers("faceoffsets", offsets((0..n).map(stream).collect()));
+        body += "</Cells>\n<CellData>\n";
+        Self { body, appended: a }
     }
-    body += "</CellData>\n</Piece>\n";
-    a.finish(file, "UnstructuredGrid", &body)
+
+    /// A file: cells with fields.
+    pub fn write(&self, file: &mut dyn Write, fields: &[(&str, Data)]) -> io::Result<()> {
+        let (mut a, mut body) = (self.appended.clone(), self.body.clone());
+        for (name, data) in fields {
+            body += &a.floats(name, data);
+        }
+        body += "</CellData>\n</Piece>\n";
+        a.finish(file, "UnstructuredGrid", &body)
+    }
 }
 
 /// Points with fields.

@@ -3,8 +3,8 @@
 //! mean velocity of the particles in the cell. Stable, but what the fluid gets is not what the particles take.
 //!
 //! U_s of filled cells is the mean of the particles mapped there and is not smoothed. Cells void of particles that β
-//! still reaches take the mean weighted by the kernel, (G ε_s U_s)/(G ε_s); R continues U_s into them by diffusion with
-//! filled cells held fixed, which decays to zero away from the bed.
+//! still reaches take the mean weighted by the kernel, (G ε_s U_s)/(G ε_s), or, as in R, U_s continued into them by
+//! diffusion with filled cells held fixed (`coupling.void_velocity = "pinned"`), which decays to zero away from the bed.
 
 use super::{Before, Cells, Scheme};
 
@@ -42,7 +42,11 @@ impl Scheme for Implicit {
         for (j, l) in cells.smoothed.iter().enumerate() {
             let beta = l[4];
             sp[j] = beta;
-            su[j] = solids_velocity(&cells.mapped[j], &cells.solids[j]).map(|u| beta * u);
+            let u = match cells.pinned {
+                Some(u) => u[j],
+                None => solids_velocity(&cells.mapped[j], &cells.solids[j]),
+            };
+            su[j] = u.map(|u| beta * u);
         }
     }
 }

@@ -51,6 +51,8 @@ pub struct Cells<'a> {
     pub mapped: &'a [Lanes],
     /// fluid velocity of the last step, m/s
     pub fluid: &'a [[f64; 3]],
+    /// solids velocity continued into void cells with filled ones held fixed, m/s; `None`: the kernel's mean there
+    pub pinned: Option<&'a [[f64; 3]]>,
 }
 
 /// How the drag impulse is split between fluid matrix and right-hand side.

@@ -55,6 +55,15 @@ fn truncated(kind: Kind, a: f64, m: usize) -> Vec<f64> {
     d
 }
 
+/// The polynomial at X, by Clenshaw's recurrence.
+pub fn value(kind: Kind, c: &[f64], x: f64) -> f64 {
+    let (mut b1, mut b2) = (0.0, 0.0);
+    for c in c[1..].iter().rev() {
+        (b1, b2) = (c + 2.0 * x * b1 - b2, b1);
+    }
+    c[0] + if kind == Kind::First { x } else { 2.0 * x } * b1 - b2
+}
+
 /// The lowest degree whose neglected terms sum to no more than the tolerance.
 pub fn degree(a: f64, tolerance: f64) -> usize {
     let c = series(a);
@@ -66,10 +75,11 @@ pub fn degree(a: f64, tolerance: f64) -> usize {
     m
 }
 
-/// Coefficients of exp(−a(1−X)) to the tolerance. `matched`: the truncated polynomial keeps the variance of
-/// the Gaussian exactly (slope a at X = 1), by a slightly different a (bisection).
+/// Coefficients of exp(−a(1−X)) to the tolerance, which is shared by the neglected terms and the scaling to 1 at
+/// X = 1. `matched`: the truncated polynomial keeps the variance of the Gaussian exactly (slope a at X = 1), by a
+/// slightly different a (bisection); the neglected terms alone are then as small as the tolerance.
 pub fn chebyshev(kind: Kind, a: f64, tolerance: f64, matched: bool) -> Vec<f64> {
-    let m = degree(a, tolerance);
+    let m = degree(a, if matched { tolerance } else { 0.5 * tolerance });
     if !matched || m == 0 {
         return truncated(kind, a, m);
     }
@@ -137,16 +147,6 @@ pub fn positive(kind: Kind, coefficients: &[f64]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn value(kind: Kind, c: &[f64], x: f64) -> f64 {
-        let (mut before, mut now, mut sum) = (0.0, 1.0, 0.0);
-        for (k, c) in c.iter().enumerate() {
-            sum += c * now;
-            let twice = if k == 0 && kind == Kind::First { 1.0 } else { 2.0 };
-            (before, now) = (now, twice * x * now - before);
-        }
-        sum
-    }
 
     #[test]
     fn the_polynomials_are_exponentials_to_the_tolerance() {

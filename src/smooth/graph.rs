@@ -4,7 +4,9 @@
 //! Rows may be renumbered so that neighbours lie close in memory (reverse Cuthill–McKee); within a row the entries
 //! stay in the order of the neighbours' slots, so that sums and results do not depend on it, to the bit.
 
-use super::sweep::Real;
+use super::Active;
+use super::active::BLOCK;
+use super::real::Real;
 use crate::mesh::Mesh;
 
 /// Rows of A in the precision of the sweeps.
@@ -16,6 +18,69 @@ pub struct Rows<T> {
     pub(super) to: Vec<u32>,
     /// a_ij
     pub(super) a: Vec<T>,
+    /// lines and the rest, without a gap
+    pub(super) runs: Vec<Run>,
+    /// run of the first row of each block
+    pub(super) first_run: Vec<u32>,
+}
+
+/// Most neighbours of a row in a line.
+pub(super) const LINE: usize = 6;
+/// Shorter lines are not worth their own loop.
+const SHORTEST: usize = 8;
+
+/// Rows that follow each other: a line of hexahedra whose neighbours all stand at the same distances, or others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Run {
+    /// row after the last
+    pub end: u32,
+    /// entries per row; 0: not a line
+    pub entries: u8,
+    /// which entry is the row before; the next one is the row after
+    pub west: u8,
+    /// neighbour − row, per entry
+    pub offsets: [i32; LINE],
+}
+
+/// Kinds of lines for which there is a loop (entries, west): inside a block of hexahedra, on one of its sides, in a plane.
+const LINES: [(u8, u8); 4] = [(6, 2), (5, 2), (5, 1), (4, 1)];
+
+/// The runs of all rows.
+fn runs(start: &[u32], to: &[u32]) -> Vec<Run> {
+    let rows = start.len() - 1;
+    let line_of = |i: usize| -> Option<Run> {
+        let to = &to[start[i] as usize..start[i + 1] as usize];
+        let mut run = Run { end: i as u32 + 1, entries: to.len() as u8, west: 0, offsets: [0; LINE] };
+        if to.len() > LINE {
+            return None;
+        }
+        run.offsets.iter_mut().zip(to).for_each(|(o, to)| *o = (i64::from(*to) - i as i64) as i32);
+        run.west = run.offsets[..to.len()].windows(2).position(|w| w == [-1, 1])? as u8;
+        LINES.contains(&(run.entries, run.west)).then_some(run)
+    };
+    let mut runs: Vec<Run> = Vec::new();
+    let other = |end: usize, runs: &mut Vec<Run>| match runs.last_mut().filter(|r| r.entries == 0) {
+        Some(last) => last.end = end as u32,
+        None => runs.push(Run { end: end as u32, entries: 0, west: 0, offsets: [0; LINE] }),
+    };
+    let mut i = 0;
+    while i < rows {
+        let mut end = i + 1;
+        if let Some(line) = line_of(i) {
+            let same = |j: usize| line_of(j).is_some_and(|l| Run { end: line.end, ..l } == line);
+            while end < rows && same(end) {
+                end += 1;
+            }
+            if end - i >= SHORTEST {
+                runs.push(Run { end: end as u32, ..line });
+                i = end;
+                continue;
+            }
+        }
+        other(end, &mut runs);
+        i = end;
+    }
+    runs
 }
 
 /// The operator of one mesh and one T; shared by all smoothers of a run.
@@ -30,13 +95,16 @@ pub struct Graph {
     pub diagonal: f64,
 }
 
-/// Renumber when neighbours are this much further apart in memory than they need be.
+/// Renumber when neighbours are this much further apart in memory than they need be, and not in lines.
 const WORTH_IT: f64 = 2.0;
 
 impl Graph {
     /// T per link (m2), aligned with `mesh.links`. Links with T = 0 are left out.
     pub fn new(mesh: &Mesh, diffusion: &[f64]) -> Self {
         let plain = Self::in_order(mesh, diffusion, None);
+        if plain.in_lines() > 0.5 {
+            return plain;
+        }
         let order = cuthill_mckee(&plain.rows);
         let row_of = inverse(&order);
         let far = |row: &dyn Fn(u32) -> u32| {
@@ -67,7 +135,7 @@ impl Graph {
             }
             start.push(to.len() as u32);
         }
-        let rows = Rows { start, to, a };
+        let rows = Rows::new(start, to, a);
         let d = rows.diagonal();
         let mut graph = Self { rows, order, spectrum: 0.0, diagonal: 0.0 };
         graph.spectrum = graph.links().map(|(i, j)| d[i as usize] + d[j as usize]).fold(0.0, f64::max);
@@ -93,6 +161,34 @@ impl Graph {
     pub(super) fn slot(&self, row: u32) -> u32 {
         self.order.as_ref().map_or(row, |o| o[0][row as usize])
     }
+    /// Bytes of one sweep over the blocks up to a ring: so many fields of eight f64, and the rows (a line needs no
+    /// index).
+    pub fn bytes(&self, active: &Active, ring: usize, fields: usize) -> f64 {
+        let (mut sum, mut run) = (0, 0);
+        for (b, r) in active.blocks.iter().enumerate() {
+            if usize::from(*r) > ring {
+                continue;
+            }
+            for i in b * BLOCK..self.len().min((b + 1) * BLOCK) {
+                while self.rows.runs[run].end as usize <= i {
+                    run += 1;
+                }
+                let entries = (self.rows.start[i + 1] - self.rows.start[i]) as usize;
+                let index = if self.rows.runs[run].entries > 0 { 0 } else { 4 + 4 * entries };
+                sum += 64 * fields + 8 * entries + index;
+            }
+        }
+        sum as f64
+    }
+    /// Share of the rows that are in lines.
+    pub fn in_lines(&self) -> f64 {
+        let (mut begin, mut rows) = (0, 0);
+        for r in &self.rows.runs {
+            rows += if r.entries > 0 { r.end - begin } else { 0 };
+            begin = r.end;
+        }
+        f64::from(rows) / self.len() as f64
+    }
     /// (row, neighbouring row) of every entry.
     fn links(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
         (0..self.len()).flat_map(|i| self.rows.entries(i).0.iter().map(move |j| (i as u32, *j)))
@@ -100,6 +196,24 @@ impl Graph {
 }
 
 impl<T: Real> Rows<T> {
+    fn new(start: Vec<u32>, to: Vec<u32>, a: Vec<T>) -> Self {
+        let runs = runs(&start, &to);
+        let mut at = 0;
+        let first_run = (0..start.len() - 1).step_by(BLOCK).map(|row| {
+            while runs[at].end as usize <= row {
+                at += 1;
+            }
+            at as u32
+        });
+        let first_run = first_run.collect();
+        Self { start, to, a, runs, first_run }
+    }
+    /// Every row by its indices.
+    #[cfg(test)]
+    pub(super) fn forget_lines(&mut self) {
+        self.runs = vec![Run { end: self.len() as u32, entries: 0, west: 0, offsets: [0; LINE] }];
+        self.first_run.fill(0);
+    }
     pub(super) fn len(&self) -> usize {
         self.start.len() - 1
     }
@@ -114,7 +228,7 @@ impl<T: Real> Rows<T> {
     /// The same rows in another precision.
     pub(super) fn cast<U: Real>(&self) -> Rows<U> {
         let a = self.a.iter().map(|a| U::from_f64(a.to_f64())).collect();
-        Rows { start: self.start.clone(), to: self.to.clone(), a }
+        Rows::new(self.start.clone(), self.to.clone(), a)
     }
 }
 

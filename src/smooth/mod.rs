@@ -12,22 +12,31 @@
 
 mod active;
 mod average;
+mod classes;
 pub mod coefficients;
 mod diffusion;
 mod direct;
+pub mod factors;
 mod field;
 mod graph;
 mod pcg;
+mod pinned;
 mod polynomial;
+mod product;
+mod real;
+mod recurrence;
 mod sweep;
+pub mod wake;
 
 pub use active::Active;
 pub use average::TimeAverage;
+pub use classes::Classes;
 pub use diffusion::Diffusion;
 pub use direct::Direct;
 pub use field::{Field, Scratch};
 pub use graph::Graph;
 pub use pcg::Implicit;
+pub use pinned::Pinned;
 pub use polynomial::{Polynomial, Single};
 
 use crate::mesh::Mesh;
@@ -74,7 +83,7 @@ pub struct Properties {
 }
 
 /// A way to smooth cell fields.
-pub trait Smoother: Send {
+pub trait Smoother: Send + Sync {
     /// Name in case.toml.
     fn name(&self) -> &'static str;
     /// What it keeps, its error, its cost.
@@ -132,7 +141,7 @@ pub const NAMES: &[&str] = &[
 
 /// Above this tolerance `chebyshev` keeps the kernel's variance exactly; below, the plain series is nearer to exp(Δ_T).
 const MATCHED: f64 = 1e-3;
-/// Residual at which the implicit solves end, relative to the first (the papers' baseline).
+/// Normalised residual at which the implicit solves end (OpenFOAM's `tolerance`; the papers' baseline).
 const SOLVED: f64 = 1e-6;
 /// Steps of `backward-euler`.
 const EULER_STEPS: usize = 4;

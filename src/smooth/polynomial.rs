@@ -6,8 +6,11 @@
 //! entry of P is ≥ 0, so the result keeps the sign and the range of a field on any mesh.
 
 use super::coefficients::{self, Kind};
+use super::factors;
 use super::graph::{Graph, Rows};
-use super::sweep::{self, Recurrence};
+use super::product::Product;
+use super::real::Real;
+use super::recurrence::{self, Recurrence};
 use super::{Active, Direction, Positivity, Properties, Scratch, Smoother};
 use crate::step::Lanes;
 use std::sync::Arc;
@@ -15,12 +18,41 @@ use std::sync::Arc;
 /// q a little above max A_ii: keeps P_ii above the rounding of a row.
 const MARGIN: f64 = 1.0 + 1e-7;
 
+/// How it is evaluated.
+#[derive(Clone, Debug)]
+enum Form {
+    Product(Product),
+    Recurrence(Recurrence),
+}
+
+impl Form {
+    fn degree(&self) -> usize {
+        match self {
+            Self::Product(p) => p.degree(),
+            Self::Recurrence(r) => r.alpha.len() - 1,
+        }
+    }
+    fn apply<T: Real>(
+        &self,
+        rows: &Rows<T>,
+        field: &mut [[T; 8]],
+        active: &Active,
+        direction: Direction,
+        [a, b]: [&mut [[T; 8]]; 2],
+    ) {
+        match self {
+            Self::Product(p) => p.apply(rows, field, active, direction, a),
+            Self::Recurrence(r) => recurrence::apply(rows, r, field, active, direction, [a, b]),
+        }
+    }
+}
+
 /// A polynomial of the operator.
 #[derive(Clone, Debug)]
 pub struct Polynomial {
     name: &'static str,
     graph: Arc<Graph>,
-    recurrence: Recurrence,
+    form: Form,
     certified: bool,
     properties: Properties,
 }
@@ -35,7 +67,7 @@ impl Polynomial {
             self_adjoint: true,
             positive: Positivity::Measured,
             error: "below the tolerance in the V norm",
-            cost: "sqrt(T λ ln(1/tolerance)) sweeps of 332 bytes per active cell (hexahedra)",
+            cost: "sqrt(T λ ln(1/tolerance)) sweeps of some 190 bytes per active cell (hexahedra)",
         };
         Self::of_kind("chebyshev", Kind::First, graph, tolerance, matched, properties)
     }
@@ -70,9 +102,12 @@ impl Polynomial {
         }
         let last = if kind == Kind::First { 1.0 } else { 2.0 };
         let scale = if lambda > 0.0 { 2.0 / lambda } else { 0.0 };
-        let recurrence = Recurrence { alpha, gamma: 2.0, last, three_terms: true, scale };
+        let form = match factors::factors(kind, &alpha, tolerance) {
+            Some(factors) => Form::Product(Product { factors, scale }),
+            None => Form::Recurrence(Recurrence { alpha, gamma: 2.0, last, three_terms: true, scale }),
+        };
         let positive = if certified { Positivity::Proven } else { properties.positive };
-        Self { name, graph, recurrence, certified, properties: Properties { positive, ..properties } }
+        Self { name, graph, form, certified, properties: Properties { positive, ..properties } }
     }
 
     /// The positive polynomial; tolerance: mass of the Poisson distribution cut off.
@@ -80,7 +115,7 @@ impl Polynomial {
         let q = graph.diagonal * MARGIN;
         let alpha = coefficients::poisson(q, tolerance);
         let scale = if q > 0.0 { 1.0 / q } else { 0.0 };
-        let recurrence = Recurrence { alpha, gamma: 1.0, last: 1.0, three_terms: false, scale };
+        let form = Form::Recurrence(Recurrence { alpha, gamma: 1.0, last: 1.0, three_terms: false, scale });
         let properties = Properties {
             conservative: true,
             constants: true,
@@ -89,7 +124,7 @@ impl Polynomial {
             error: "below the tolerance in the V norm and in the maximum norm",
             cost: "q + 3 sqrt(q) sweeps, q = T max A_ii: as chebyshev to b/h = 1.4, 3 times at 4, 4 times at 8",
         };
-        Self { name: "uniformization", graph, recurrence, certified: true, properties }
+        Self { name: "uniformization", graph, form, certified: true, properties }
     }
 
     /// Positive by proof: uniformization always, Chebyshev when its coefficients in powers of X are.
@@ -111,25 +146,28 @@ impl Smoother for Polynomial {
         self.properties
     }
     fn degree(&self) -> usize {
-        self.recurrence.alpha.len() - 1
+        self.form.degree()
     }
     fn plan(&self, occupied: &[u32], active: &mut Active) {
         active.update(&self.graph, occupied, Some(self.degree()));
     }
     fn bytes(&self, active: &Active, direction: Direction) -> f64 {
-        sweep::bytes(&self.graph, &self.recurrence, active, direction)
+        match &self.form {
+            Form::Product(p) => p.bytes(&self.graph, active, direction),
+            Form::Recurrence(r) => recurrence::bytes(&self.graph, r, active, direction),
+        }
     }
     fn apply(&mut self, lanes: &mut [Lanes], active: &Active, direction: Direction, scratch: &mut Scratch) {
         scratch.fit(lanes.len());
         let Scratch { a, b } = scratch;
         let Some([slot_of, _]) = self.graph.order.as_ref() else {
-            return sweep::apply(&self.graph.rows, &self.recurrence, lanes, active, direction, [a, b]);
+            return self.form.apply(&self.graph.rows, lanes, active, direction, [a, b]);
         };
         // renumbered: the caller's field is copied in the order of rows and is then free to work in
         for (row, slot) in slot_of.iter().enumerate() {
             a[row] = lanes[*slot as usize];
         }
-        sweep::apply(&self.graph.rows, &self.recurrence, a, active, direction, [b, lanes]);
+        self.form.apply(&self.graph.rows, a, active, direction, [b, lanes]);
         for (row, slot) in slot_of.iter().enumerate() {
             lanes[*slot as usize] = a[row];
         }
@@ -156,7 +194,7 @@ impl Single {
         for (row, to) in field.iter_mut().enumerate() {
             *to = lanes[slot(row)].map(|x| x as f32);
         }
-        sweep::apply(&self.rows, &self.polynomial.recurrence, field, active, direction, [a, b]);
+        self.polynomial.form.apply(&self.rows, field, active, direction, [a, b]);
         for (row, from) in field.iter().enumerate() {
             lanes[slot(row)] = from.map(f64::from);
         }
@@ -177,4 +215,73 @@ fn totals(lanes: &[Lanes], volume: &[f64]) -> (Lanes, Lanes) {
         crate::sums::sum(lanes.iter().zip(volume).map(|(x, v)| v * f(x[l])))
     };
     (std::array::from_fn(|l| of(&|x| x, l)), std::array::from_fn(|l| of(&f64::abs, l)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::made::Made;
+    use crate::smooth::Diffusion;
+
+    /// Lines of hexahedra go without indices; the same rows one by one, by their indices, give the same bits.
+    #[test]
+    fn lines_have_the_bits_of_single_rows() {
+        for n in [[30, 5, 6], [12, 40, 1], [3, 4, 5]] {
+            let mesh = Made::graded(n, [0.06, 0.04, 0.05]).mesh();
+            let graph = Graph::new(&mesh, &Diffusion::uniform(0.012).links(&mesh));
+            assert_eq!(graph.in_lines() > 0.5, n[0] >= 9, "{n:?}: {}", graph.in_lines());
+            let mut single = graph.clone();
+            single.rows.forget_lines();
+            assert_eq!(single.in_lines(), 0.0);
+            let mut seed = 3;
+            let random = |_| std::array::from_fn(|_| crate::bench::scene::random(&mut seed));
+            let field: Vec<Lanes> = (0..mesh.len()).map(random).collect();
+            let of = |graph: &Graph, make: fn(Arc<Graph>) -> Polynomial| {
+                let (mut out, mut s) = (field.clone(), make(Arc::new(graph.clone())));
+                let active = Active::whole(mesh.len());
+                s.apply(&mut out, &active, Direction::Spread, &mut Scratch::default());
+                out
+            };
+            let makes: [fn(Arc<Graph>) -> Polynomial; 3] = [
+                |g| Polynomial::chebyshev(g, 1e-4, false),
+                |g| Polynomial::chebyshev(g, 1e-13, false),
+                |g| Polynomial::uniformization(g, 1e-4),
+            ];
+            for make in makes {
+                assert_eq!(of(&graph, make), of(&single, make), "{n:?}");
+            }
+        }
+    }
+
+    /// The product and the recurrence are one polynomial.
+    #[test]
+    fn both_forms_agree() {
+        let mesh = Made::tet([7, 6, 5], [0.06, 0.04, 0.05]).mesh();
+        let graph = Arc::new(Graph::new(&mesh, &Diffusion::uniform(0.012).links(&mesh)));
+        let mut field = vec![[0.0; 8]; mesh.len()];
+        field[mesh.len() / 2] = [1.0; 8];
+        for tolerance in [1e-2, 1e-4, 1e-6] {
+            let mut product = Polynomial::chebyshev(Arc::clone(&graph), tolerance, tolerance > 1e-3);
+            let Form::Product(p) = &product.form else { panic!("{tolerance}: the recurrence was chosen") };
+            let a = 0.5 * graph.spectrum;
+            assert!((p.scale * graph.spectrum / 2.0 - 1.0).abs() < 1e-12, "not the certified one");
+            let alpha = coefficients::chebyshev(Kind::First, a, tolerance, tolerance > 1e-3);
+            let mut recurrence = product.clone();
+            recurrence.form = Form::Recurrence(Recurrence {
+                alpha,
+                gamma: 2.0,
+                last: 1.0,
+                three_terms: true,
+                scale: p.scale,
+            });
+            let whole = Active::whole(mesh.len());
+            let of = |s: &mut Polynomial| {
+                let mut out = field.clone();
+                s.apply(&mut out, &whole, Direction::Spread, &mut Scratch::default());
+                out
+            };
+            let (a, b) = (of(&mut product), of(&mut recurrence));
+            assert!(a.iter().zip(&b).all(|(a, b)| (a[0] - b[0]).abs() < 1e-12), "{tolerance}");
+        }
+    }
 }

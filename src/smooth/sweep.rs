@@ -1,157 +1,43 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Sweeps over the rows of the operator: all polynomials of A are evaluated here, by one backward recurrence
+//! One sweep over the rows of the operator: out = p x + q A x [+ r other] [+ s out], on eight lanes of every row within
+//! reach. Each row is computed by itself, in the order of its entries: threads, numbering and the way the
+//! neighbours are found do not change a bit.
 //!
-//!   b_k = α_k φ + γ X b_{k+1} − β b_{k+2},  X = 1 − σ A,  result α_0 φ + γ_0 X b_1 − β b_2
-//!
-//! (Clenshaw 1955 for Chebyshev polynomials of both kinds, Horner for powers of X). A sweep reads φ, b_{k+1} and
-//! b_{k+2} and writes b_k over b_{k+2}: 256 bytes per cell in f64 and the row; two fields of scratch. Each row is
-//! computed by itself, in the order of its entries: threads and numbering do not change a bit.
+//! Along a line of a hexahedral mesh (`graph::Run`) the neighbours stand at constant distances: no index is read and
+//! two of the values stay in registers. All other rows go by their indices.
 //!
 //! Uses the rayon pool it is called in (one range of rows per thread, one barrier per sweep); outside of a pool
 //! it runs on the calling thread.
 
 use super::active::BLOCK;
-use super::graph::{Graph, Rows};
+use super::graph::{LINE, Rows};
+use super::real::Real;
 use super::{Active, Direction};
 use pulp::{Simd, WithSimd};
 
-/// A number of the sweeps, and its vectors (at most eight lanes each) on the machine at hand.
-#[allow(missing_docs)]
-pub trait Real: Copy + Send + Sync {
-    const ZERO: Self;
-    /// rounded
-    fn from_f64(x: f64) -> Self;
-    /// exact
-    fn to_f64(self) -> f64;
-    type Of<S: Simd>: Copy;
-    fn dispatch<W: WithSimd>(work: W) -> W::Output;
-    fn vectors<S: Simd>(x: &[Self; 8]) -> &[Self::Of<S>];
-    fn vectors_mut<S: Simd>(x: &mut [Self; 8]) -> &mut [Self::Of<S>];
-    fn splat<S: Simd>(s: S, x: Self) -> Self::Of<S>;
-    fn add<S: Simd>(s: S, a: Self::Of<S>, b: Self::Of<S>) -> Self::Of<S>;
-    fn sub<S: Simd>(s: S, a: Self::Of<S>, b: Self::Of<S>) -> Self::Of<S>;
-    fn mul<S: Simd>(s: S, a: Self::Of<S>, b: Self::Of<S>) -> Self::Of<S>;
-}
-impl Real for f64 {
-    const ZERO: Self = 0.0;
-    fn from_f64(x: f64) -> Self {
-        x
-    }
-    fn to_f64(self) -> f64 {
-        self
-    }
-    type Of<S: Simd> = S::f64s;
-    fn dispatch<W: WithSimd>(work: W) -> W::Output {
-        pulp::Arch::new().dispatch(work)
-    }
-    #[inline(always)]
-    fn vectors<S: Simd>(x: &[Self; 8]) -> &[S::f64s] {
-        S::as_simd_f64s(x).0
-    }
-    #[inline(always)]
-    fn vectors_mut<S: Simd>(x: &mut [Self; 8]) -> &mut [S::f64s] {
-        S::as_mut_simd_f64s(x).0
-    }
-    #[inline(always)]
-    fn splat<S: Simd>(s: S, x: Self) -> S::f64s {
-        s.splat_f64s(x)
-    }
-    #[inline(always)]
-    fn add<S: Simd>(s: S, a: S::f64s, b: S::f64s) -> S::f64s {
-        s.add_f64s(a, b)
-    }
-    #[inline(always)]
-    fn sub<S: Simd>(s: S, a: S::f64s, b: S::f64s) -> S::f64s {
-        s.sub_f64s(a, b)
-    }
-    #[inline(always)]
-    fn mul<S: Simd>(s: S, a: S::f64s, b: S::f64s) -> S::f64s {
-        s.mul_f64s(a, b)
-    }
-}
-impl Real for f32 {
-    const ZERO: Self = 0.0;
-    fn from_f64(x: f64) -> Self {
-        x as f32
-    }
-    fn to_f64(self) -> f64 {
-        f64::from(self)
-    }
-    type Of<S: Simd> = S::f32s;
-    /// Not by the widest vectors: a cell has eight lanes, AVX-512 would want sixteen.
-    fn dispatch<W: WithSimd>(work: W) -> W::Output {
-        #[cfg(target_arch = "x86_64")]
-        if let Some(v) = pulp::x86::V3::try_new() {
-            return Simd::vectorize(v, work);
-        }
-        Simd::vectorize(pulp::Scalar::new(), work)
-    }
-    #[inline(always)]
-    fn vectors<S: Simd>(x: &[Self; 8]) -> &[S::f32s] {
-        S::as_simd_f32s(x).0
-    }
-    #[inline(always)]
-    fn vectors_mut<S: Simd>(x: &mut [Self; 8]) -> &mut [S::f32s] {
-        S::as_mut_simd_f32s(x).0
-    }
-    #[inline(always)]
-    fn splat<S: Simd>(s: S, x: Self) -> S::f32s {
-        s.splat_f32s(x)
-    }
-    #[inline(always)]
-    fn add<S: Simd>(s: S, a: S::f32s, b: S::f32s) -> S::f32s {
-        s.add_f32s(a, b)
-    }
-    #[inline(always)]
-    fn sub<S: Simd>(s: S, a: S::f32s, b: S::f32s) -> S::f32s {
-        s.sub_f32s(a, b)
-    }
-    #[inline(always)]
-    fn mul<S: Simd>(s: S, a: S::f32s, b: S::f32s) -> S::f32s {
-        s.mul_f32s(a, b)
-    }
-}
-
-/// Coefficients of the recurrence.
-#[derive(Clone, Debug)]
-pub(super) struct Recurrence {
-    /// α_0 … α_m
-    pub alpha: Vec<f64>,
-    /// γ of all sweeps but the last
-    pub gamma: f64,
-    /// γ_0
-    pub last: f64,
-    /// β is 1 (three terms) or 0
-    pub three_terms: bool,
-    /// σ
-    pub scale: f64,
-}
-
 /// What one sweep does, and to which rows.
-struct Sweep<'a, T> {
-    rows: &'a Rows<T>,
-    blocks: &'a [u16],
+#[derive(Clone, Copy)]
+pub(super) struct Sweep<'a, T> {
+    pub rows: &'a Rows<T>,
+    pub active: &'a Active,
     /// blocks up to this ring are computed
-    reach: u16,
+    pub reach: u16,
     /// blocks beyond and up to this ring are set to zero
-    zero: u16,
-    alpha: T,
-    gamma: T,
-    scale: T,
-    /// b_{k+1}
-    now: &'a [[T; 8]],
+    pub zero: u16,
+    /// x
+    pub now: &'a [[T; 8]],
+    /// p, q, r, s
+    pub factors: [f64; 4],
 }
 
-/// out = α now + γ X now.
-const OF_ITSELF: u8 = 0;
-/// out = α other + γ X now.
-const TWO_TERMS: u8 = 1;
-/// out = α other + γ X now − out.
-const THREE_TERMS: u8 = 2;
-/// out = α out + γ X now.
-const LAST_TWO_TERMS: u8 = 3;
-/// out = α out + γ X now − other.
-const LAST_THREE_TERMS: u8 = 4;
+/// out = p x + q A x.
+pub(super) const ALONE: u8 = 0;
+/// … + r other.
+pub(super) const OTHER: u8 = 1;
+/// … + s out.
+pub(super) const OUT: u8 = 2;
+/// … + r other + s out.
+pub(super) const BOTH: u8 = 3;
 
 /// A sweep over the rows of one thread.
 struct Part<'a, T, const KIND: u8> {
@@ -166,46 +52,134 @@ impl<T: Real, const KIND: u8> WithSimd for Part<'_, T, KIND> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, v: S) {
         let Self { sweep: s, first_block, other, out } = self;
-        let first_row = first_block * BLOCK;
-        let [alpha, gamma, scale] = [s.alpha, s.gamma, s.scale].map(|x| T::splat(v, x));
-        for (b, out) in out.chunks_mut(BLOCK).enumerate() {
-            let ring = s.blocks[first_block + b];
-            if ring > s.reach {
-                if ring <= s.zero {
-                    out.fill([T::ZERO; 8]);
-                }
-                continue;
-            }
-            let begin = first_row + b * BLOCK;
-            let end = begin + out.len();
-            let range = s.rows.start[begin] as usize..s.rows.start[end] as usize;
-            let (mut to, mut a) = (&s.rows.to[range.clone()], &s.rows.a[range]);
-            let other = if KIND == OF_ITSELF || KIND == LAST_TWO_TERMS { &[] } else { &other[begin..end] };
-            let (own, starts) = (&s.now[begin..end], &s.rows.start[begin..=end]);
-            for i in 0..out.len().min(own.len()) {
-                let n = (starts[i + 1] - starts[i]) as usize;
-                let (to_row, to_rest) = to.split_at(n);
-                let (a_row, a_rest) = a.split_at(n);
-                (to, a) = (to_rest, a_rest);
-                let out = T::vectors_mut::<S>(&mut out[i]);
-                for (p, out) in out.iter_mut().enumerate() {
-                    let x = T::vectors::<S>(&own[i])[p];
-                    let mut flux = T::splat(v, T::ZERO);
-                    for (a, to) in a_row.iter().zip(to_row) {
-                        let far = T::vectors::<S>(&s.now[*to as usize])[p];
-                        flux = T::add(v, flux, T::mul(v, T::splat(v, *a), T::sub(v, x, far)));
+        let blocks = &s.active.blocks[first_block..][..out.len().div_ceil(BLOCK)];
+        let mut b = 0;
+        while b < blocks.len() {
+            // blocks of a kind that follow each other
+            let live = blocks[b] <= s.reach;
+            let same = blocks[b..].iter().take_while(|r| (**r <= s.reach) == live).count();
+            let rows = b * BLOCK..out.len().min((b + same) * BLOCK);
+            if live {
+                let mut begin = first_block * BLOCK + rows.start;
+                let end = first_block * BLOCK + rows.end;
+                let mut out = &mut out[rows];
+                for run in &s.rows.runs[s.rows.first_run[first_block + b] as usize..] {
+                    if begin >= end {
+                        break;
                     }
-                    let now = T::mul(v, gamma, T::sub(v, x, T::mul(v, scale, flux)));
-                    let of = |y| T::add(v, T::mul(v, alpha, y), now);
-                    let other = |i: usize| T::vectors::<S>(&other[i])[p];
-                    *out = match KIND {
-                        OF_ITSELF => of(x),
-                        TWO_TERMS => of(other(i)),
-                        THREE_TERMS => T::sub(v, of(other(i)), *out),
-                        LAST_TWO_TERMS => of(*out),
-                        _ => T::sub(v, of(*out), other(i)),
-                    };
+                    let n = end.min(run.end as usize) - begin;
+                    let (mine, rest) = out.split_at_mut(n);
+                    out = rest;
+                    let other = if KIND & OTHER > 0 { &other[begin..][..n] } else { &[] };
+                    let work = Rest::<T, S, KIND> { v, sweep: s, begin, other };
+                    match (run.entries, run.west) {
+                        (6, 2) => work.line::<6, 2>(mine, &run.offsets),
+                        (5, 2) => work.line::<5, 2>(mine, &run.offsets),
+                        (5, 1) => work.line::<5, 1>(mine, &run.offsets),
+                        (4, 1) => work.line::<4, 1>(mine, &run.offsets),
+                        _ => work.any(mine),
+                    }
+                    begin += n;
                 }
+            } else {
+                for (b, out) in (b..).zip(out[rows].chunks_mut(BLOCK)) {
+                    if blocks[b] <= s.zero {
+                        out.fill([T::ZERO; 8]);
+                    }
+                }
+            }
+            b += same;
+        }
+    }
+}
+
+/// Rows from `begin` on.
+struct Rest<'a, T: Real, S: Simd, const KIND: u8> {
+    v: S,
+    sweep: &'a Sweep<'a, T>,
+    begin: usize,
+    other: &'a [[T; 8]],
+}
+
+impl<T: Real, S: Simd, const KIND: u8> Rest<'_, T, S, KIND> {
+    #[inline(always)]
+    fn result(
+        &self,
+        k: [T::Of<S>; 4],
+        x: T::Of<S>,
+        flux: T::Of<S>,
+        i: usize,
+        lane: usize,
+        out: &mut T::Of<S>,
+    ) {
+        let v = self.v;
+        let mut y = T::add(v, T::mul(v, k[0], x), T::mul(v, k[1], flux));
+        if KIND & OTHER > 0 {
+            y = T::add(v, y, T::mul(v, k[2], T::vectors::<S>(&self.other[i])[lane]));
+        }
+        if KIND & OUT > 0 {
+            y = T::add(v, y, T::mul(v, k[3], *out));
+        }
+        *out = y;
+    }
+
+    #[inline(always)]
+    fn factors(&self) -> [T::Of<S>; 4] {
+        self.sweep.factors.map(|x| T::splat(self.v, T::from_f64(x)))
+    }
+
+    /// Rows of any kind.
+    #[inline(always)]
+    fn any(self, out: &mut [[T; 8]]) {
+        let (s, v, n) = (self.sweep, self.v, out.len());
+        let k = self.factors();
+        let starts = &s.rows.start[self.begin..=self.begin + n];
+        let range = starts[0] as usize..starts[n] as usize;
+        let (mut to, mut a) = (&s.rows.to[range.clone()], &s.rows.a[range]);
+        let own = &s.now[self.begin..][..n];
+        for i in 0..n {
+            let entries = (starts[i + 1] - starts[i]) as usize;
+            let (to_row, to_rest) = to.split_at(entries);
+            let (a_row, a_rest) = a.split_at(entries);
+            (to, a) = (to_rest, a_rest);
+            for (lane, out) in T::vectors_mut::<S>(&mut out[i]).iter_mut().enumerate() {
+                let x = T::vectors::<S>(&own[i])[lane];
+                let mut flux = T::splat(v, T::ZERO);
+                for (a, to) in a_row.iter().zip(to_row) {
+                    let far = T::vectors::<S>(&s.now[*to as usize])[lane];
+                    flux = T::add(v, flux, T::mul(v, T::splat(v, *a), T::sub(v, x, far)));
+                }
+                self.result(k, x, flux, i, lane, out);
+            }
+        }
+    }
+
+    /// Rows of a line with N neighbours each, the Wth of which is the row before and the next the row after.
+    #[inline(always)]
+    fn line<const N: usize, const W: usize>(self, out: &mut [[T; 8]], offsets: &[i32; LINE]) {
+        let (s, v, n) = (self.sweep, self.v, out.len());
+        let k = self.factors();
+        let first = s.rows.start[self.begin] as usize;
+        let a = &s.rows.a[first..][..N * n].as_chunks::<N>().0[..n];
+        let far: [&[[T; 8]]; N] =
+            std::array::from_fn(|k| &s.now[self.begin.wrapping_add_signed(offsets[k] as isize)..][..n]);
+        let own = &s.now[self.begin..][..n];
+        for lane in 0..T::vectors::<S>(&[T::ZERO; 8]).len() {
+            let mut west = T::vectors::<S>(&far[W][0])[lane];
+            let mut x = T::vectors::<S>(&own[0])[lane];
+            for i in 0..n {
+                let east = T::vectors::<S>(&far[W + 1][i])[lane];
+                let mut flux = T::splat(v, T::ZERO);
+                for k in 0..N {
+                    let far = match k {
+                        _ if k == W => west,
+                        _ if k == W + 1 => east,
+                        _ => T::vectors::<S>(&far[k][i])[lane],
+                    };
+                    flux = T::add(v, flux, T::mul(v, T::splat(v, a[i][k]), T::sub(v, x, far)));
+                }
+                self.result(k, x, flux, i, lane, &mut T::vectors_mut::<S>(&mut out[i])[lane]);
+                (west, x) = (x, east);
             }
         }
     }
@@ -213,7 +187,7 @@ impl<T: Real, const KIND: u8> WithSimd for Part<'_, T, KIND> {
 
 impl<T: Real> Sweep<'_, T> {
     /// Runs it on every thread of the pool; `cuts`: first block of each thread and the end.
-    fn run<const KIND: u8>(&self, cuts: &[usize], other: &[[T; 8]], mut out: &mut [[T; 8]]) {
+    pub(super) fn run<const KIND: u8>(&self, cuts: &[usize], other: &[[T; 8]], mut out: &mut [[T; 8]]) {
         let part = |first_block, out| T::dispatch(Part::<T, KIND> { sweep: self, first_block, other, out });
         if cuts.len() == 2 {
             return part(0, out);
@@ -232,7 +206,7 @@ impl<T: Real> Sweep<'_, T> {
 }
 
 /// First block of each thread and the end: equal numbers of active blocks.
-fn cuts(active: &Active, reach: usize) -> Vec<usize> {
+pub(super) fn cuts(active: &Active, reach: usize) -> Vec<usize> {
     let threads = if rayon::current_thread_index().is_some() { rayon::current_num_threads() } else { 1 };
     let live = |r: &u16| usize::from(*r) <= reach;
     let all = active.blocks.iter().filter(|r| live(r)).count();
@@ -247,101 +221,11 @@ fn cuts(active: &Active, reach: usize) -> Vec<usize> {
     cuts
 }
 
-/// Furthest ring that the sweep for b_k must visit: a spread has come m − k rings far, a gather has k to go.
-fn reach(direction: Direction, m: usize, k: usize) -> usize {
+/// Furthest ring that the `done`th of m sweeps must visit: a spread has come so far, a gather has m − `done` to go.
+pub(super) fn reach(direction: Direction, m: usize, done: usize) -> usize {
     match direction {
-        Direction::Spread => m - k,
-        Direction::Gather => k,
-        Direction::Both => k.max(m - k),
+        Direction::Spread => done,
+        Direction::Gather => m - done,
+        Direction::Both => done.max(m - done),
     }
-}
-
-/// All sweeps of one application.
-struct Sweeps<'a, T> {
-    rows: &'a Rows<T>,
-    r: &'a Recurrence,
-    active: &'a Active,
-    direction: Direction,
-}
-
-impl<'a, T: Real> Sweeps<'a, T> {
-    /// The sweep that computes b_k, with another α if given. `fresh`: it writes its field for the first time, whose
-    /// far rows must read as zero in a spread (in a gather they are not read).
-    fn at(&self, k: usize, alpha: f64, now: &'a [[T; 8]], fresh: bool) -> Sweep<'a, T> {
-        let m = self.r.alpha.len() - 1;
-        let reach = reach(self.direction, m, k) as u16;
-        let zero = if self.direction != Direction::Gather && fresh { m as u16 + 1 } else { 0 };
-        let gamma = T::from_f64(if k == 0 { self.r.last } else { self.r.gamma });
-        let (alpha, scale) = (T::from_f64(alpha), T::from_f64(self.r.scale));
-        Sweep { rows: self.rows, blocks: &self.active.blocks, reach, zero, alpha, gamma, scale, now }
-    }
-}
-
-/// Applies the polynomial to `field` (in the order of rows). The result is in `field`.
-pub(super) fn apply<T: Real>(
-    rows: &Rows<T>,
-    r: &Recurrence,
-    field: &mut [[T; 8]],
-    active: &Active,
-    direction: Direction,
-    [mut now, mut old]: [&mut [[T; 8]]; 2],
-) {
-    let m = r.alpha.len() - 1;
-    let top = r.alpha[m];
-    let cuts = &cuts(active, m);
-    if m == 0 {
-        return; // α_0 = 1
-    }
-    if m == 1 {
-        for (to, from) in now.iter_mut().zip(field.iter()) {
-            *to = from.map(|x| T::from_f64(top * x.to_f64()));
-        }
-        let all = Sweeps { rows, r, active, direction };
-        return all.at(0, r.alpha[0], now, false).run::<LAST_TWO_TERMS>(cuts, &[], field);
-    }
-    // b_m = α_m φ is not stored: b_{m−1} = α_{m−1} φ + γ α_m X φ
-    let mut s = Sweeps { rows, r, active, direction }.at(m - 1, r.alpha[m - 1], field, true);
-    s.gamma = T::from_f64(r.gamma * top);
-    s.run::<OF_ITSELF>(cuts, &[], now);
-    // and b_{m−2} = (α_{m−2} − β α_m) φ + γ X b_{m−1}
-    let alpha = r.alpha[m - 2] - if r.three_terms { top } else { 0.0 };
-    if m == 2 {
-        let s = Sweeps { rows, r, active, direction }.at(0, alpha, now, false);
-        return s.run::<LAST_TWO_TERMS>(cuts, &[], field);
-    }
-    Sweeps { rows, r, active, direction }.at(m - 2, alpha, now, true).run::<TWO_TERMS>(cuts, field, old);
-    std::mem::swap(&mut now, &mut old);
-    for k in (1..m - 2).rev() {
-        let s = Sweeps { rows, r, active, direction }.at(k, r.alpha[k], now, false);
-        if r.three_terms {
-            s.run::<THREE_TERMS>(cuts, field, old);
-        } else {
-            s.run::<TWO_TERMS>(cuts, field, old);
-        }
-        std::mem::swap(&mut now, &mut old);
-    }
-    let s = Sweeps { rows, r, active, direction }.at(0, r.alpha[0], now, false);
-    if r.three_terms {
-        s.run::<LAST_THREE_TERMS>(cuts, old, field);
-    } else {
-        s.run::<LAST_TWO_TERMS>(cuts, &[], field);
-    }
-}
-
-/// Bytes that must move between memory and the core in one application in f64: fields once per sweep, rows once.
-pub(super) fn bytes(graph: &Graph, r: &Recurrence, active: &Active, direction: Direction) -> f64 {
-    let m = r.alpha.len() - 1;
-    let per_row = 4.0 + 12.0 * graph.rows.to.len() as f64 / graph.len() as f64;
-    let of_sweep = |k: usize| {
-        let reach = reach(direction, m, k);
-        let fields = match (k, r.three_terms) {
-            _ if k + 1 == m => 2, // reads φ, writes
-            _ if k + 2 == m => 3, // reads φ and the last, writes
-            (0, false) => 3,
-            (_, true) => 4,
-            (_, false) => 3,
-        };
-        active.rows_within(reach, graph.len()) as f64 * (64.0 * f64::from(fields) + per_row)
-    };
-    (0..m).map(of_sweep).sum()
 }

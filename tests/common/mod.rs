@@ -2,6 +2,8 @@
 //! Meshes and messages made for tests: a box of hexahedra in one piece or cut in two, walls or cyclic in x.
 #![allow(dead_code)]
 
+pub mod partners;
+
 use voidage::mesh::{MeshPiece, Patch, PatchKind};
 use voidage_wire::{Block, field, frame, kind};
 

@@ -82,6 +82,9 @@
 // arrays of VOIDAGE_PARTICLES, n particles, DEM to coupler, if send.history: velocity at its start, m/s
 #define VOIDAGE_LAST_VELOCITY 18
 
+// arrays of VOIDAGE_PARTICLES, n particles, DEM to coupler, if drive.memory: VOIDAGE_MEMORY of the last exchange, as it came
+#define VOIDAGE_LAST_MEMORY 19
+
 // arrays of VOIDAGE_DRIVE, same n and order as the particles sent, coupler to DEM: K, kg/s
 #define VOIDAGE_DRAG_COEFFICIENT 20
 
@@ -96,6 +99,18 @@
 
 // arrays of VOIDAGE_DRIVE, at the fluid's write times: bytes, the restart file to write; with it VOIDAGE_FLAGS (last step)
 #define VOIDAGE_RESTART_FILE 24
+
+// arrays of VOIDAGE_DRIVE, same n and order as the particles sent, coupler to DEM, if drive.added_mass: added mass, kg
+#define VOIDAGE_ADDED_MASS 25
+
+// arrays of VOIDAGE_DRIVE, same n and order as the particles sent, coupler to DEM, if drive.rotation: K_w, N m s: torque K_w (W - w)
+#define VOIDAGE_ROTATION_COEFFICIENT 26
+
+// arrays of VOIDAGE_DRIVE, same n and order as the particles sent, coupler to DEM, if drive.rotation: W, rotation of the fluid, rad/s
+#define VOIDAGE_ROTATION_RATE 27
+
+// arrays of VOIDAGE_DRIVE, same n and order as the particles sent, coupler to DEM, if drive.memory: that many numbers per particle, to be kept with it and sent back as VOIDAGE_LAST_MEMORY; 0 for a new particle
+#define VOIDAGE_MEMORY 28
 
 // arrays of VOIDAGE_FIELDS, c cells, CFD to coupler: m/s
 #define VOIDAGE_FLUID_VELOCITY 30

@@ -47,6 +47,8 @@ pub const VOIDAGE_LAST_DRIVE_VELOCITY: u32 = 16;
 pub const VOIDAGE_LAST_FORCE: u32 = 17;
 /// arrays of VOIDAGE_PARTICLES, n particles, DEM to coupler, if send.history: velocity at its start, m/s
 pub const VOIDAGE_LAST_VELOCITY: u32 = 18;
+/// arrays of VOIDAGE_PARTICLES, n particles, DEM to coupler, if drive.memory: VOIDAGE_MEMORY of the last exchange, as it came
+pub const VOIDAGE_LAST_MEMORY: u32 = 19;
 /// arrays of VOIDAGE_DRIVE, same n and order as the particles sent, coupler to DEM: K, kg/s
 pub const VOIDAGE_DRAG_COEFFICIENT: u32 = 20;
 /// arrays of VOIDAGE_DRIVE, same n and order as the particles sent, coupler to DEM: u, m/s
@@ -57,6 +59,14 @@ pub const VOIDAGE_FORCE: u32 = 22;
 pub const VOIDAGE_CHARGED: u32 = 23;
 /// arrays of VOIDAGE_DRIVE, at the fluid's write times: bytes, the restart file to write; with it VOIDAGE_FLAGS (last step)
 pub const VOIDAGE_RESTART_FILE: u32 = 24;
+/// arrays of VOIDAGE_DRIVE, same n and order as the particles sent, coupler to DEM, if drive.added_mass: added mass, kg
+pub const VOIDAGE_ADDED_MASS: u32 = 25;
+/// arrays of VOIDAGE_DRIVE, same n and order as the particles sent, coupler to DEM, if drive.rotation: K_w, N m s: torque K_w (W - w)
+pub const VOIDAGE_ROTATION_COEFFICIENT: u32 = 26;
+/// arrays of VOIDAGE_DRIVE, same n and order as the particles sent, coupler to DEM, if drive.rotation: W, rotation of the fluid, rad/s
+pub const VOIDAGE_ROTATION_RATE: u32 = 27;
+/// arrays of VOIDAGE_DRIVE, same n and order as the particles sent, coupler to DEM, if drive.memory: that many numbers per particle, to be kept with it and sent back as VOIDAGE_LAST_MEMORY; 0 for a new particle
+pub const VOIDAGE_MEMORY: u32 = 28;
 /// arrays of VOIDAGE_FIELDS, c cells, CFD to coupler: m/s
 pub const VOIDAGE_FLUID_VELOCITY: u32 = 30;
 /// arrays of VOIDAGE_FIELDS, c cells, CFD to coupler: Pa/m, of the last velocity correction

@@ -63,11 +63,16 @@ pub mod field {
     pub const LAST_DRIVE_VELOCITY: u32 = 16;
     pub const LAST_FORCE: u32 = 17;
     pub const LAST_VELOCITY: u32 = 18;
+    pub const LAST_MEMORY: u32 = 19;
     pub const DRAG_COEFFICIENT: u32 = 20;
     pub const DRIVE_VELOCITY: u32 = 21;
     pub const FORCE: u32 = 22;
     pub const CHARGED: u32 = 23;
     pub const RESTART_FILE: u32 = 24;
+    pub const ADDED_MASS: u32 = 25;
+    pub const ROTATION_COEFFICIENT: u32 = 26;
+    pub const ROTATION_RATE: u32 = 27;
+    pub const MEMORY: u32 = 28;
     pub const FLUID_VELOCITY: u32 = 30;
     pub const PRESSURE_GRADIENT: u32 = 31;
     pub const STRESS_DIVERGENCE: u32 = 32;

@@ -3,7 +3,7 @@
 //!
 //! F is the drag without the share of the mean pressure gradient: type A.
 
-use super::{SMALL, power};
+use super::{SMALL, by_voidage, power};
 use crate::forces::{Around, DragLaw, Slip};
 use std::f64::consts::LN_10;
 
@@ -82,7 +82,18 @@ impl DragLaw for KochHill {
     }
     #[inline]
     fn drag_coefficient(&self, s: &Slip) -> f64 {
-        let (e, phi) = (s.voidage, (1.0 - s.voidage).clamp(SMALL, 1.0 - SMALL));
+        self.with(s, Self::factors(s.voidage))
+    }
+    fn coefficients(&self, slips: &[Slip], out: &mut [f64]) {
+        by_voidage(slips, out, Self::factors, |s, f| self.with(s, f));
+    }
+}
+
+impl KochHill {
+    /// F_0 and F_3.
+    #[inline]
+    fn factors(e: f64) -> (f64, f64) {
+        let phi = (1.0 - e).clamp(SMALL, 1.0 - SMALL);
         let e3 = e * e * e;
         let f0 = if phi < 0.4 {
             (1.0 + 3.0 * (phi / 2.0).sqrt() + phi * (135.0 / 64.0 * phi.ln() + 16.14))
@@ -90,7 +101,11 @@ impl DragLaw for KochHill {
         } else {
             10.0 * phi / e3
         };
-        let f3 = 0.0673 + 0.212 * phi + 0.0232 / (e3 * e * e);
+        (f0, 0.0673 + 0.212 * phi + 0.0232 / (e3 * e * e))
+    }
+    #[inline]
+    fn with(&self, s: &Slip, (f0, f3): (f64, f64)) -> f64 {
+        let e = s.voidage;
         s.stokes() * e * e * (f0 + 0.5 * f3 * e * s.reynolds())
     }
 }

@@ -16,7 +16,7 @@ pub use gidaspow::{Blended, Ergun, Gidaspow, WenYu};
 pub use power::{DiFelice, DiFeliceTang, Rong};
 pub use single::{NoCorrection, NoDrag, SchillerNaumann, Stokes, SyamlalOBrien};
 
-use super::DragLaw;
+use super::{DragLaw, Slip};
 
 /// Keeps logarithms and negative powers finite; far below any physical value.
 const SMALL: f64 = 1e-15;
@@ -25,6 +25,18 @@ const SMALL: f64 = 1e-15;
 #[inline]
 fn power(x: f64, p: f64) -> f64 {
     (p * x.ln()).exp()
+}
+
+/// K of many particles by `law(slip, of_voidage)`, `f` computed only where the voidage changes: particles come by
+/// cell, and in a cell the voidage is the same unless the mapping interpolates it.
+#[inline]
+fn by_voidage<F: Copy>(slips: &[Slip], out: &mut [f64], f: impl Fn(f64) -> F, law: impl Fn(&Slip, F) -> f64) {
+    let mut last: Option<(f64, F)> = None;
+    for (s, k) in slips.iter().zip(out) {
+        let known = last.filter(|l| l.0 == s.voidage).map_or_else(|| f(s.voidage), |l| l.1);
+        last = Some((s.voidage, known));
+        *k = law(s, known);
+    }
 }
 
 /// What a law may be given in `[forces]`; the defaults are those of the publications.

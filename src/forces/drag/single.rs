@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Laws from the single sphere: Stokes, Schiller & Naumann, and those scaled by the terminal-velocity ratio.
 
-use super::power;
+use super::{by_voidage, power};
 use crate::forces::{DragLaw, Slip};
 use std::f64::consts::PI;
 
@@ -36,17 +36,32 @@ impl DragLaw for SchillerNaumann {
     }
 }
 
+/// A and B of Garside & Al-Dibouni 1977.
+#[inline]
+fn powers(e: f64) -> (f64, f64) {
+    let log = e.ln(); // one logarithm for both
+    let b = if e <= 0.85 { 0.8 * (1.28 * log).exp() } else { (2.65 * log).exp() };
+    ((4.14 * log).exp(), b)
+}
+
 /// Ratio of the terminal velocities in the suspension and alone, Garside & Al-Dibouni 1977.
 #[inline]
-fn velocity_ratio(e: f64, re: f64) -> f64 {
-    let log = e.ln(); // one logarithm for both powers
-    let a = (4.14 * log).exp();
-    let b = if e <= 0.85 { 0.8 * (1.28 * log).exp() } else { (2.65 * log).exp() };
+fn velocity_ratio((a, b): (f64, f64), re: f64) -> f64 {
     0.5 * (a - 0.06 * re + ((0.06 * re).powi(2) + 0.12 * re * (2.0 * b - a) + a * a).sqrt())
 }
 
 /// Syamlal & O'Brien 1987, with C_d of Dalla Valle.
 pub struct SyamlalOBrien;
+
+impl SyamlalOBrien {
+    #[inline]
+    fn with(&self, s: &Slip, powers: (f64, f64)) -> f64 {
+        let re = s.reynolds();
+        let v = velocity_ratio(powers, re);
+        let cd_u = (0.63 * re.sqrt() + 4.8 * v.sqrt()).powi(2) * s.kinematic_viscosity / s.diameter;
+        s.volume() * s.voidage * 0.75 * cd_u * s.density / (s.diameter * v * v)
+    }
+}
 
 impl DragLaw for SyamlalOBrien {
     fn name(&self) -> &'static str {
@@ -56,10 +71,10 @@ impl DragLaw for SyamlalOBrien {
         "Syamlal & O'Brien 1987 (MFIX)"
     }
     fn drag_coefficient(&self, s: &Slip) -> f64 {
-        let (e, re) = (s.voidage, s.reynolds());
-        let v = velocity_ratio(e, re);
-        let cd_u = (0.63 * re.sqrt() + 4.8 * v.sqrt()).powi(2) * s.kinematic_viscosity / s.diameter;
-        s.volume() * e * 0.75 * cd_u * s.density / (s.diameter * v * v)
+        self.with(s, powers(s.voidage))
+    }
+    fn coefficients(&self, slips: &[Slip], out: &mut [f64]) {
+        by_voidage(slips, out, powers, |s, p| self.with(s, p));
     }
 }
 
@@ -75,7 +90,7 @@ impl DragLaw for NoCorrection {
     }
     fn drag_coefficient(&self, s: &Slip) -> f64 {
         let (e, re) = (s.voidage, s.reynolds());
-        let v = velocity_ratio(e, re);
+        let v = velocity_ratio(powers(e), re);
         let cd_u = (24.0 + 4.0 * re.sqrt() + 0.4 * re) * s.kinematic_viscosity / s.diameter;
         s.volume() * e * 0.75 * cd_u * s.density / (s.diameter * v * v)
     }

@@ -14,7 +14,7 @@ use crate::map::ParticleCentroid;
 use crate::mesh::Mesh;
 use crate::particles::Particles;
 use crate::smooth::{self, Diffusion};
-use crate::step::{CouplingStep, Fluid, Setup};
+use crate::step::{CouplingStep, Drive, Fluid, Setup};
 use crate::sums::{norm, sum, sum3};
 use std::f64::consts::PI;
 
@@ -136,6 +136,7 @@ impl Bench {
             period: PERIOD,
             voidage_min: 0.0,
             exclude_outside: false,
+            average: None,
             extra: Extra::default(),
         };
         let t = Diffusion::uniform(BANDWIDTH * DIAMETER).links(&mesh);
@@ -209,11 +210,21 @@ impl Bench {
         let mut particles = self.dem.message();
         let first = self.exchange == 0;
         self.step.before_fluid(&mut particles, first).ok()?;
-        self.dem.position.clone_from(&particles.position);
+        for (id, x) in particles.id.iter().zip(&particles.position) {
+            self.dem.position[*id as usize] = *x;
+        }
         let (reaction, terms) = if first { ([0.0; 3], 0.0) } else { self.solve() };
         self.step.after_fluid(&particles, &self.fluid, first).ok()?;
         let mut result = self.judge(&particles, reaction, terms);
-        self.interval();
+        // back into the order of the DEM, which is that of the ids
+        let (d, mut drive) = (&self.step.drive, self.step.drive.clone());
+        for (k, i) in particles.id.iter().map(|id| *id as usize).enumerate() {
+            drive.drag_coefficient[i] = d.drag_coefficient[k];
+            drive.velocity[i] = d.velocity[k];
+            drive.force[i] = d.force[k];
+            drive.charged[i] = d.charged[k];
+        }
+        self.interval(&drive);
         if !self.point.scheme.conservative() {
             // no ledger: the action is what the particles took
             let taken = sum3(self.dem.taken.iter().copied());
@@ -224,10 +235,10 @@ impl Bench {
         (result.largest < 1e12).then_some(result)
     }
 
-    fn interval(&mut self) {
+    fn interval(&mut self, drive: &Drive) {
         self.dem.held = held(self.point.mode, self.exchange);
         let before = sum3((0..PARTICLES).map(|i| self.dem.velocity[i].map(|v| self.dem.mass[i] * v)));
-        self.dem.interval(&self.step.drive, INTERVAL, PERIOD / INTERVAL as f64);
+        self.dem.interval(drive, INTERVAL, PERIOD / INTERVAL as f64);
         // what is neither drag nor momentum is weight and whatever holds them
         let after = sum3((0..PARTICLES).map(|i| self.dem.velocity[i].map(|v| self.dem.mass[i] * v)));
         let taken = sum3(self.dem.taken.iter().copied());

@@ -4,7 +4,7 @@
 //! K (u − v) + f with the current v in each DEM step, explicit for K δt/m ≤ 0.2, else exact relaxation. The impulse
 //! taken sums the half kicks, the ledger is taken − charged. Held particles do not move; what holds them is external.
 
-use crate::particles::{Particles, Totals};
+use crate::particles::{Asked, Particles, Totals};
 use crate::scheme::History;
 use crate::step::Drive;
 
@@ -45,6 +45,7 @@ impl Dem {
             velocity: zero.clone(),
             force: zero.clone(),
             charged: zero.clone(),
+            ..Drive::default()
         };
         let (held, taken) = (vec![false; n], zero.clone());
         Self {
@@ -83,6 +84,7 @@ impl Dem {
             velocity: self.velocity.clone(),
             radius: vec![self.radius; n],
             mass: self.mass.clone(),
+            asked: Asked::default(),
             ledger: (0..n).map(|i| self.ledger(i)).collect(),
             history,
             totals: Totals::default(),

@@ -8,9 +8,7 @@
 
 use super::bench::{drive, held, mesh_of, random};
 use super::{BANDWIDTH, DENSITY, DIAMETER, Mode, PARTICLES, PERIOD, Point};
-use crate::arrange::Order;
 use crate::locate::Locator;
-use crate::map::{Mapping, ParticleCentroid, Weights};
 use crate::mesh::NONE;
 use crate::smooth::{self, Active, Diffusion, Direction, Scratch};
 
@@ -93,18 +91,16 @@ impl System {
         let whole = spread.iter().sum::<f64>() / PARTICLES as f64;
         let mass = spread.iter().map(|s| mean * s / whole).collect();
 
-        let (mut host, mut weights) = (vec![NONE; PARTICLES], Weights::default());
+        let mut host = vec![NONE; PARTICLES];
         Locator::new(&mesh).locate(&mesh, &mut position, &mut host).expect("all are inside");
-        ParticleCentroid.weights(&mesh, &position, &[0.5 * DIAMETER; PARTICLES], &host, &mut weights);
         let t = Diffusion::uniform(BANDWIDTH * DIAMETER).links(&mesh);
         let mut g = smooth::by_name("chebyshev", &mesh, &t, 1e-4).expect("a smoother of the list");
-        let (whole, mut order, mut scratch) =
-            (Active::whole(mesh.len()), Order::default(), Scratch::default());
-        order.update(mesh.len(), &(0..PARTICLES as i64).collect::<Vec<_>>(), &host);
-        let weight: Vec<Vec<f64>> = (0..PARTICLES)
-            .map(|i| {
+        let (whole, mut scratch) = (Active::whole(mesh.len()), Scratch::default());
+        let weight: Vec<Vec<f64>> = host
+            .iter()
+            .map(|host| {
                 let mut lanes = vec![[0.0; 8]; mesh.len()];
-                weights.deposit(&mesh, &order.list, &mut lanes, |q| [if q == i { 1.0 } else { 0.0 }; 8]);
+                lanes[*host as usize] = [1.0 / mesh.volume[*host as usize]; 8];
                 g.apply(&mut lanes, &whole, Direction::Spread, &mut scratch);
                 lanes.iter().zip(&mesh.volume).map(|(l, v)| l[0] * v).collect()
             })
