@@ -111,6 +111,16 @@ fn reaction(step: &CouplingStep, fluid: &Fluid, model_a: bool) -> V {
     }))
 }
 
+/// Σ |terms| that `reaction` adds up, N s.
+fn terms(step: &CouplingStep, fluid: &Fluid, model_a: bool) -> f64 {
+    let (s, m) = (&step.sources, &step.mesh);
+    sum((0..m.len()).map(|j| {
+        let stress = norm(fluid.pressure_gradient[j]) + norm(fluid.stress_divergence[j]);
+        let share = if model_a { (1.0 - s.voidage[j]) * stress } else { 0.0 };
+        PERIOD * m.volume[j] * (norm(s.su[j]) + s.sp[j] * norm(fluid.velocity[j]) + share)
+    }))
+}
+
 /// Two exchanges of every combination of the lists.
 fn exchange(mesh: &Mesh, p: &Particles, seed: u64) -> Result<(), TestCaseError> {
     let mut s = seed ^ 0xabcd;
@@ -149,7 +159,13 @@ fn exchange(mesh: &Mesh, p: &Particles, seed: u64) -> Result<(), TestCaseError> 
         step.books.reaction = reaction(&step, &fluid, !model_b);
         let error = step.books.error(None);
         if exact && scheme.conservative() {
-            prop_assert!(error < 1e-12, "{name}: action - reaction {error:e}");
+            // the fluid's terms may cancel to little action; their own rounding is no error of the scheme
+            let rounding = 4.0 * f64::EPSILON * terms(&step, &fluid, !model_b);
+            let gap = error * step.books.scale;
+            prop_assert!(
+                gap <= 1e-12 * step.books.scale + rounding,
+                "{name}: action - reaction {gap:e} N s, of action {error:e}, rounding {rounding:e}"
+            );
         }
         prop_assert!(step.sources.sp.iter().all(|x| *x >= 0.0), "{name}: a negative Sp");
         prop_assert!(step.sources.voidage.iter().all(|e| *e > 0.0 && *e <= 1.0), "{name}: voidage");
