@@ -588,12 +588,11 @@ fn a_scheme_that_needs_the_last_interval_says_so() {
     assert!(e.contains("conservative-adaptive") && e.contains("./setup build"), "{e}");
 }
 
-/// Bits of Sp, Su, ε and of each particle's reply (by id) after two exchanges on so many threads.
-fn bits_on(
-    threads: usize,
-    backwards: bool,
-    mapping: &str,
-) -> (Vec<[u64; 5]>, Vec<(i64, [u64; 10])>, [u64; 7]) {
+/// Bits of the cells (ε, Sp, Su), of the replies by id, and of the sums.
+type Bits = (Vec<[u64; 5]>, Vec<(i64, [u64; 10])>, [u64; 7]);
+
+/// After two exchanges on so many threads.
+fn bits_on(threads: usize, backwards: bool, mapping: &str) -> Bits {
     use voidage::bench::{scene, step::setup};
     let mesh = scene::mesh(scene::BOX, 12_000);
     let air = scene::air(&mesh);
