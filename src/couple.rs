@@ -15,6 +15,7 @@ use crate::partners::{PartnerError, Partners};
 use crate::record::{RecordError, Recorder};
 use crate::step::{CouplingStep, Fluid, StepError};
 use crate::sums::norm;
+use crate::threads;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -216,21 +217,13 @@ impl<T: Transport> Exchange<'_, T> {
         }
         let stage = |source| CoupleError::Step { step: k, source };
         let step = &mut self.step;
-        match &self.pool {
-            Some(pool) => pool.install(|| step.before_fluid(&mut particles, first)),
-            None => step.before_fluid(&mut particles, first),
-        }
-        .map_err(stage)?;
+        threads::within(self.pool.as_ref(), || step.before_fluid(&mut particles, first)).map_err(stage)?;
         self.send_sources(k, time)?;
         if !first {
             (last, write, reaction) = self.receive_fluid(k, &mut course.fluid, &mut wait_cfd)?;
         }
         let (step, fluid) = (&mut self.step, &course.fluid);
-        match &self.pool {
-            Some(pool) => pool.install(|| step.after_fluid(&particles, fluid, first)),
-            None => step.after_fluid(&particles, fluid, first),
-        }
-        .map_err(stage)?;
+        threads::within(self.pool.as_ref(), || step.after_fluid(&particles, fluid, first)).map_err(stage)?;
         self.step.books.reaction = reaction;
         let file = |source| CoupleError::File { what: "restart set", source };
         let set = match &self.sets {

@@ -245,8 +245,9 @@ pub struct CouplingStep {
     hosts: Vec<u32>,
     order: Order,
     spare: Spare,
-    /// places and hosts of the last exchange, in its order
+    /// places of the last exchange
     places: Places,
+    /// while locating: hosts of the last exchange, in its order
     last_hosts: Vec<u32>,
     /// the fluid of the last step as it came, m/s
     fluid_velocity: Vec<[f64; 3]>,
@@ -462,6 +463,7 @@ impl CouplingStep {
     /// Stage 2: host cells, and the table in their order; last hosts are only a guess where to look first.
     fn locate(&mut self, p: &mut Particles) -> Result<(), StepError> {
         let begin = Instant::now();
+        std::mem::swap(&mut self.hosts, &mut self.last_hosts);
         self.hosts.clear();
         let guess = p.id.iter().map(|id| self.last_hosts.get(self.places.of(*id) as usize).copied());
         self.hosts.extend(guess.map(|g| g.unwrap_or(NONE)));
@@ -487,7 +489,7 @@ impl CouplingStep {
         p.arrange(list, &mut self.spare);
         self.last_hosts.clear();
         self.last_hosts.extend(list.iter().map(|i| self.hosts[*i as usize]));
-        self.hosts.clone_from(&self.last_hosts);
+        std::mem::swap(&mut self.hosts, &mut self.last_hosts);
         self.places.update(&p.id);
         self.seconds.locate = (located - begin).as_secs_f64();
         self.seconds.arrange = located.elapsed().as_secs_f64();

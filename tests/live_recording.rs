@@ -2,31 +2,18 @@
 //! The real programs, recorded: replays to the bit on any number of threads; a killed run leaves a readable file. Needs
 //! `./setup build`.
 
+mod common;
+
+use common::folder::{copy, root};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
-
-fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-}
 
 fn voidage(arguments: &[&str]) -> Command {
     assert!(root().join("build/bin/voidageFoam").exists(), "the C++ sides are not built: type ./setup build");
     let mut c = Command::new(env!("CARGO_BIN_EXE_voidage"));
     c.env("VOIDAGE_HOME", root().join("build")).stdin(Stdio::null()).args(arguments);
     c
-}
-
-fn copy(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).unwrap();
-    for e in std::fs::read_dir(from).unwrap().flatten() {
-        let to = to.join(e.file_name());
-        if e.path().is_dir() {
-            copy(&e.path(), &to);
-        } else {
-            std::fs::copy(e.path(), to).unwrap();
-        }
-    }
 }
 
 /// A copy of a case that ends at `end` (s), removed at the end.

@@ -1,20 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Bad input: every message of `voidage check` says where, what was given, what is accepted and what to type.
 
+mod common;
+
+use common::folder::copy;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-
-fn copy(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).unwrap();
-    for e in std::fs::read_dir(from).unwrap().flatten() {
-        let to = to.join(e.file_name());
-        if e.path().is_dir() {
-            copy(&e.path(), &to);
-        } else {
-            std::fs::copy(e.path(), to).unwrap();
-        }
-    }
-}
 
 /// A change of a file: (file, old text, new text).
 type Edit<'a> = (&'a str, &'a str, &'a str);

@@ -35,25 +35,8 @@ fn mixed(n: usize) -> Vec<P> {
 }
 
 fn setup(model_b: bool, extra: Extra) -> Setup {
-    Setup {
-        drag: forces::by_name("koch-hill").unwrap(),
-        scheme: scheme::by_name("conservative").unwrap(),
-        fluid_velocity: FluidVelocity::Linear,
-        model_b,
-        two_way: true,
-        pressure_force: !model_b,
-        archimedes: [0.0, 0.0, -9.81],
-        mean_pressure_gradient: [0.0; 3],
-        gravity: [0.0, 0.0, -9.81],
-        solids_flux: true,
-        density: 1.2,
-        kinematic_viscosity: 1.5e-5,
-        period: PERIOD,
-        voidage_min: 0.0,
-        exclude_outside: false,
-        extra,
-        average: None,
-    }
+    let like = common::step::setup("conservative", FluidVelocity::Linear, model_b);
+    Setup { period: PERIOD, extra, ..like }
 }
 
 fn fluid(mesh: &Mesh) -> Fluid {

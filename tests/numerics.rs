@@ -3,6 +3,7 @@
 
 mod common;
 
+use common::step::setup;
 use common::{Hex, P, cloud, message, random};
 use voidage::arrange::Places;
 use voidage::couple::receive_mesh;
@@ -287,28 +288,6 @@ fn f32_conserves_and_cells_that_are_too_large_keep_what_they_have() {
     assert!(!kept.is_empty() && kept.iter().all(|c| (out[*c][0] - field[*c][0]).abs() < 1e-14));
     assert!(moved.iter().any(|c| out[*c][0] != field[*c][0]));
     assert!((total(&out, 0) / total(&field, 0) - 1.0).abs() < 1e-13);
-}
-
-fn setup(scheme: &str, fluid_velocity: FluidVelocity, model_b: bool) -> Setup {
-    Setup {
-        drag: forces::by_name("koch-hill").unwrap(),
-        scheme: scheme::by_name(scheme).unwrap(),
-        fluid_velocity,
-        model_b,
-        two_way: true,
-        pressure_force: !model_b,
-        archimedes: [0.0, 0.0, -9.81],
-        mean_pressure_gradient: [0.0; 3],
-        gravity: [0.0, 0.0, -9.81],
-        solids_flux: true,
-        density: 1.2,
-        kinematic_viscosity: 1.5e-5,
-        period: 1e-3,
-        voidage_min: 0.0,
-        exclude_outside: false,
-        extra: forces::Extra::default(),
-        average: None,
-    }
 }
 
 fn fluid(mesh: &Mesh) -> Fluid {

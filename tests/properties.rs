@@ -2,10 +2,13 @@
 //! What must hold always (design §3.1), on random meshes with random particles, for every mapping, smoother and scheme
 //! of the lists: a method that joins a list is tested without a line here.
 
+mod common;
+
 use proptest::prelude::*;
 use std::f64::consts::PI;
 use voidage::arrange::Order;
 use voidage::interpolate::FluidVelocity;
+use voidage::locate;
 use voidage::map::{self, Weights};
 use voidage::mesh::Mesh;
 use voidage::mesh::made::Made;
@@ -14,7 +17,6 @@ use voidage::scheme::{self, History};
 use voidage::smooth::{self, Active, Diffusion, Direction, Scratch};
 use voidage::step::{CouplingStep, Fluid, Setup};
 use voidage::sums::{norm, sum, sum3};
-use voidage::{forces, locate};
 
 type V = [f64; 3];
 const SIZE: V = [0.06, 0.04, 0.05];
@@ -78,25 +80,8 @@ fn particles(mesh: &Mesh, n: usize, seed: u64) -> Particles {
 const OPTIONS: map::Options = map::Options { bandwidth: BANDWIDTH, grid: 0.01 };
 
 fn setup(scheme: &'static dyn scheme::Scheme, how: FluidVelocity, model_b: bool) -> Setup {
-    Setup {
-        drag: forces::by_name("koch-hill").unwrap(),
-        scheme,
-        fluid_velocity: how,
-        model_b,
-        two_way: true,
-        pressure_force: !model_b,
-        archimedes: [0.0, 0.0, -9.81],
-        mean_pressure_gradient: [0.0, 2.0, 0.0],
-        gravity: [0.0, 0.0, -9.81],
-        solids_flux: true,
-        density: 1.2,
-        kinematic_viscosity: 1.5e-5,
-        period: PERIOD,
-        voidage_min: 0.0,
-        exclude_outside: false,
-        extra: forces::Extra::default(),
-        average: None,
-    }
+    let like = common::step::setup(scheme.name(), how, model_b);
+    Setup { mean_pressure_gradient: [0.0, 2.0, 0.0], period: PERIOD, ..like }
 }
 
 /// Impulse the fluid gives, from the arrays it gets and its own fields.

@@ -19,6 +19,7 @@ use std::io::{Read, Seek};
 use std::rc::Rc;
 use std::time::Duration;
 use thiserror::Error;
+use voidage_wire::memory::Words;
 use voidage_wire::{Frame, Transport, TransportError, Welcome, field, hello, kind};
 
 /// Why a recording was not replayed.
@@ -161,20 +162,6 @@ struct Played<R: Read + Seek> {
     player: Rc<RefCell<Player<R>>>,
     partner: usize,
     peer: String,
-}
-
-/// Owned words that deref to a slice.
-struct Words(Vec<u64>);
-impl std::ops::Deref for Words {
-    type Target = [u64];
-    fn deref(&self) -> &[u64] {
-        &self.0
-    }
-}
-impl std::ops::DerefMut for Words {
-    fn deref_mut(&mut self) -> &mut [u64] {
-        &mut self.0
-    }
 }
 
 impl<R: Read + Seek> Transport for Played<R> {

@@ -207,7 +207,7 @@ impl<T: Real> Sweep<'_, T> {
 
 /// First block of each thread and the end: equal numbers of active blocks.
 pub(super) fn cuts(active: &Active, reach: usize) -> Vec<usize> {
-    let threads = if rayon::current_thread_index().is_some() { rayon::current_num_threads() } else { 1 };
+    let threads = crate::threads::count();
     let live = |r: &u16| usize::from(*r) <= reach;
     let all = active.blocks.iter().filter(|r| live(r)).count();
     let (mut cuts, mut seen) = (vec![0], 0);

@@ -2,7 +2,9 @@
 //! Meshes and messages made for tests: a box of hexahedra in one piece or cut in two, walls or cyclic in x.
 #![allow(dead_code)]
 
+pub mod folder;
 pub mod partners;
+pub mod step;
 
 use voidage::mesh::{MeshPiece, Patch, PatchKind};
 use voidage_wire::{Block, field, frame, kind};

@@ -40,7 +40,7 @@ impl Transport for Memory {
 }
 
 /// Owned words that deref to a slice.
-pub struct Words(Vec<u64>);
+pub struct Words(pub Vec<u64>);
 
 impl std::ops::Deref for Words {
     type Target = [u64];
