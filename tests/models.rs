@@ -12,7 +12,6 @@ use voidage::interpolate::FluidVelocity;
 use voidage::map::{Linear, Mapping, Options, ParticleCentroid};
 use voidage::mesh::{Mesh, assemble};
 use voidage::particles::{Asked, Particles};
-use voidage::scheme;
 use voidage::smooth::{Classes, Diffusion, TimeAverage, pair};
 use voidage::step::{CouplingStep, Fluid, Setup, Sources};
 use voidage::sums::sum;
