@@ -4,7 +4,7 @@
 mod common;
 
 use common::folder::copy;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 
 /// A change of a file: (file, old text, new text).
