@@ -12,7 +12,7 @@ use crate::forces::extra::{Each, Flow};
 use crate::forces::history::Memory;
 use crate::forces::{Around, DragLaw, Extra, Slip};
 use crate::interpolate::{self, FluidVelocity};
-use crate::linearise::{LEVEL, Predicted, linearise};
+use crate::linearise::{Kept, LEVEL, Part, Predicted, Predictions, linearise};
 use crate::locate::{Locator, Lost};
 use crate::map::{Mapping, Weights};
 use crate::mesh::{Mesh, NONE};
@@ -214,6 +214,8 @@ struct Batch {
     vectors: Vec<[f64; 3]>,
     /// ũ, m/s
     gathered: Vec<[f64; 3]>,
+    /// d, m/s
+    defects: Vec<[f64; 3]>,
     /// K, kg/s
     drag: Vec<f64>,
 }
@@ -258,7 +260,7 @@ pub struct CouplingStep {
     dirty: Vec<u32>,
     /// rows where `sources` are not those of an empty cell
     filled: Vec<u32>,
-    predicted: Vec<Predicted>,
+    predicted: Predictions,
     /// explicit forces with a reaction (N), empty if there are none
     extra: Vec<[f64; 3]>,
     /// fluid velocity one step before the last, for the added mass
@@ -321,7 +323,7 @@ impl CouplingStep {
             work: Field::zero(n),
             dirty: Vec::new(),
             filled: Vec::new(),
-            predicted: Vec::new(),
+            predicted: Predictions::default(),
             extra: Vec::new(),
             fluid_before: Vec::new(),
             mapped: Vec::new(),
@@ -628,8 +630,9 @@ impl CouplingStep {
         let (q, period, scheme) = (&self.predicted, self.setup.period, self.setup.scheme);
         let ledger = |i: usize| if scheme.conservative() { p.ledger[i] } else { [0.0; 3] };
         let mesh = self.wide.as_ref().unwrap_or(&self.mesh);
-        self.weights
-            .deposit(mesh, &self.order, &mut self.work, |i, _: &mut ()| linearise(&q[i], ledger(i), period));
+        self.weights.deposit(mesh, &self.order, &mut self.work, |i, _: &mut ()| {
+            linearise(&q.of(i), ledger(i), period)
+        });
         self.smooth_work(Direction::Spread);
         self.sum_classes();
         let other = self.wide.is_some() || self.setup.average.is_some();
@@ -668,15 +671,21 @@ impl CouplingStep {
     /// Stages 5 and 6: K from the voidage at the particle and the fluid of the last step; C, B, d. In exchange 0
     /// the fluid stands in `gathered`, else it was smoothed in pass a.
     fn predict(&mut self, p: &Particles, first: bool) {
-        self.predicted.resize(p.len(), Predicted::default());
-        self.predicted[self.order.inside..].fill(Predicted::default());
+        let s = &self.setup;
+        let plain = s.scheme.wholly_implicit();
+        let kept = Kept {
+            implicit: !plain,
+            explicit: !plain || s.extra.forces(),
+            defect: s.fluid_velocity != FluidVelocity::Gather,
+        };
         let pieces = &self.order.pieces;
         let mut out = std::mem::take(&mut self.predicted);
-        let parts = threads::cut(&mut out, pieces.iter().map(|p| p.particles.end));
-        threads::map(pieces.iter().zip(parts).collect(), |(piece, out)| {
-            let (begin, mut batch) = (piece.particles.start, Batch::default());
-            for (k, out) in out.chunks_mut(BATCH).enumerate() {
-                self.predict_batch(p, begin + k * BATCH, first, &mut batch, out);
+        out.fit(p.len(), self.order.inside, kept);
+        let parts = out.parts(pieces.iter().map(|p| p.particles.end));
+        threads::map(pieces.iter().zip(parts).collect(), |(piece, mut out)| {
+            let mut batch = Batch::default();
+            for at in (0..out.len()).step_by(BATCH) {
+                self.predict_batch(p, piece.particles.start, at, first, &mut batch, &mut out);
             }
         });
         self.predicted = out;
@@ -685,21 +694,31 @@ impl CouplingStep {
         }
     }
 
-    /// `predict` for the particles from `begin` on.
-    fn predict_batch(&self, p: &Particles, begin: usize, first: bool, b: &mut Batch, out: &mut [Predicted]) {
+    /// `predict` for up to `BATCH` particles of a piece that begins at `begin`, from its entry `at` on.
+    fn predict_batch(
+        &self,
+        p: &Particles,
+        begin: usize,
+        at: usize,
+        first: bool,
+        b: &mut Batch,
+        out: &mut Part,
+    ) {
         let s = &self.setup;
+        let (count, begin) = (BATCH.min(out.len() - at), begin + at);
+        let fluid = if first { 0 } else { FLUID };
         let around = s.drag.looks_around();
         b.slips.clear();
         b.vectors.clear();
         b.gathered.clear();
-        b.drag.resize(out.len(), 0.0);
-        for k in 0..out.len() {
+        b.defects.clear();
+        b.drag.resize(count, 0.0);
+        for k in 0..count {
             let i = begin + k;
             let l = self.weights.gather(&self.work, i);
             let voidage = (1.0 - l[0]).max(s.voidage_min.max(f64::MIN_POSITIVE));
             let g = if first { self.weights.gather(&self.gathered, i) } else { l };
-            let at = if first { 0 } else { FLUID };
-            let gathered = [g[at], g[at + 1], g[at + 2]];
+            let gathered = [g[fluid], g[fluid + 1], g[fluid + 2]];
             let host = self.hosts[i] as usize;
             let u = interpolate::fluid_velocity(
                 s.fluid_velocity,
@@ -710,7 +729,7 @@ impl CouplingStep {
                 gathered,
             );
             let vector = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
-            out[k].defect = [0, 1, 2].map(|a| u[a] - gathered[a]);
+            b.defects.push([0, 1, 2].map(|a| u[a] - gathered[a]));
             let slip = Slip {
                 diameter: 2.0 * p.radius[i] / s.extra.ratio(&p.asked.kind, i),
                 voidage,
@@ -730,7 +749,7 @@ impl CouplingStep {
         if !around {
             s.drag.coefficients(&b.slips, &mut b.drag);
         }
-        for k in 0..out.len() {
+        for k in 0..count {
             let i = begin + k;
             let ratio = s.extra.ratio(&p.asked.kind, i);
             let parcel = ratio * ratio * ratio;
@@ -739,7 +758,7 @@ impl CouplingStep {
             let last = p.history.last(i, v, inertia, s.gravity, s.period);
             let drag_coefficient = b.drag[k] * share;
             let before = Before { drag_coefficient, slip: b.vectors[k], inertia, period: s.period, last };
-            out[k] = Predicted::new(s.scheme, &before, out[k].defect, b.gathered[k]);
+            out.set(at + k, &Predicted::new(s.scheme, &before, b.defects[k], b.gathered[k]));
         }
     }
 
@@ -779,7 +798,7 @@ impl CouplingStep {
         let hosts = &self.hosts[..inside];
         s.extra.compute(&flow, hosts, each, &p.asked.memory, &mut self.extra, &mut d.memory);
         for i in 0..inside {
-            (0..3).for_each(|a| self.predicted[i].explicit[a] += self.extra[i][a]);
+            self.predicted.add(i, self.extra[i]);
         }
     }
 
@@ -848,7 +867,8 @@ impl CouplingStep {
             threads::map(pieces.iter().zip(parts).collect(), |(piece, (((k_of, u_of), f_of), j_of))| {
                 let mut sums = Sums::<10>::default();
                 for (at, i) in piece.particles.clone().enumerate() {
-                    let (g, q, v) = (self.weights.gather(&self.gathered, i), &self.predicted[i], p.volume(i));
+                    let (g, q, v) =
+                        (self.weights.gather(&self.gathered, i), self.predicted.of(i), p.volume(i));
                     let u = [0, 1, 2].map(|a| g[a] + q.defect[a]);
                     let mut outer =
                         [0, 1, 2].map(|a| -v * (s.density * s.archimedes[a] + s.mean_pressure_gradient[a]));

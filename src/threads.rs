@@ -30,11 +30,11 @@ pub fn map<T: Send, R: Send>(parts: Vec<T>, f: impl Fn(T) -> R + Sync) -> Vec<R>
     parts.into_par_iter().map(&f).collect()
 }
 
-/// `slice` cut at `ends` (ascending).
+/// `slice` cut at `ends` (ascending); an empty one into empty parts.
 pub fn cut<T>(mut slice: &mut [T], ends: impl IntoIterator<Item = usize>) -> Vec<&mut [T]> {
-    let mut at = 0;
+    let (mut at, none) = (0, slice.is_empty());
     let part = |end: usize| {
-        let (part, rest) = std::mem::take(&mut slice).split_at_mut(end - at);
+        let (part, rest) = std::mem::take(&mut slice).split_at_mut(if none { 0 } else { end - at });
         (slice, at) = (rest, end);
         part
     };

@@ -60,8 +60,10 @@ impl Series {
 }
 
 /// Appended blocks: header text with offsets, then the bytes.
-#[derive(Clone, Default)]
+#[derive(Default)]
 struct Appended {
+    /// length of what another block list wrote before
+    before: usize,
     bytes: Vec<u8>,
 }
 
@@ -73,11 +75,12 @@ impl Appended {
         components: usize,
         data: impl Iterator<Item = [u8; B]>,
     ) -> String {
-        let offset = self.bytes.len();
+        let begin = self.bytes.len();
+        let offset = self.before + begin;
         self.bytes.extend([0; 8]);
         data.for_each(|x| self.bytes.extend_from_slice(&x));
-        let length = (self.bytes.len() - offset - 8) as u64;
-        self.bytes[offset..offset + 8].copy_from_slice(&length.to_le_bytes());
+        let length = (self.bytes.len() - begin - 8) as u64;
+        self.bytes[begin..begin + 8].copy_from_slice(&length.to_le_bytes());
         format!(
             "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"appended\" offset=\"{offset}\"/>\n"
         )
@@ -93,12 +96,14 @@ impl Appended {
         self.bytes.reserve(4 * numbers.len() + 8);
         self.array(name, "Float32", components, numbers.iter().map(|x| (*x as f32).to_le_bytes()))
     }
-    fn finish(self, file: &mut dyn Write, kind: &str, body: &str) -> io::Result<()> {
+    /// `first`: the bytes before.
+    fn finish(self, file: &mut dyn Write, kind: &str, body: &str, first: &[u8]) -> io::Result<()> {
         write!(
             file,
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" \
              header_type=\"UInt64\">\n<{kind}>\n{body}</{kind}>\n<AppendedData encoding=\"raw\">\n_"
         )?;
+        file.write_all(first)?;
         file.write_all(&self.bytes)?;
         write!(file, "\n</AppendedData>\n</VTKFile>\n")
     }
@@ -107,7 +112,7 @@ impl Appended {
 /// The part of a .vtu file that stays the same: points and cells.
 pub struct Grid {
     body: String,
-    appended: Appended,
+    bytes: Vec<u8>,
 }
 
 impl Grid {
@@ -146,17 +151,18 @@ impl Grid {
         body += &a.integers("faces", faces);
         body += &a.integers("faceoffsets", offsets((0..n).map(stream).collect()));
         body += "</Cells>\n<CellData>\n";
-        Self { body, appended: a }
+        Self { body, bytes: a.bytes }
     }
 
     /// A file: cells with fields.
     pub fn write(&self, file: &mut dyn Write, fields: &[(&str, Data)]) -> io::Result<()> {
-        let (mut a, mut body) = (self.appended.clone(), self.body.clone());
+        let mut a = Appended { before: self.bytes.len(), bytes: Vec::new() };
+        let mut body = self.body.clone();
         for (name, data) in fields {
             body += &a.floats(name, data);
         }
         body += "</CellData>\n</Piece>\n";
-        a.finish(file, "UnstructuredGrid", &body)
+        a.finish(file, "UnstructuredGrid", &body, &self.bytes)
     }
 }
 
@@ -174,7 +180,7 @@ pub fn points(file: &mut dyn Write, position: &[[f64; 3]], fields: &[(&str, Data
         body += &a.floats(name, data);
     }
     body += "</PointData>\n</Piece>\n";
-    a.finish(file, "PolyData", &body)
+    a.finish(file, "PolyData", &body, &[])
 }
 
 #[cfg(test)]

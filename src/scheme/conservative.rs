@@ -14,6 +14,9 @@ impl Scheme for Conservative {
     fn source(&self) -> &'static str {
         "design §2.2, C = K, B = 0, with ledger"
     }
+    fn wholly_implicit(&self) -> bool {
+        true
+    }
     fn predict(&self, before: &Before) -> (f64, [f64; 3]) {
         (before.drag_coefficient, [0.0; 3])
     }

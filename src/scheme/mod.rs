@@ -73,6 +73,10 @@ pub trait Scheme: Sync {
     fn wants_solids(&self) -> bool {
         false
     }
+    /// True: C = K and B = 0 for every particle.
+    fn wholly_implicit(&self) -> bool {
+        false
+    }
     /// C (kg/s, ≥ 0) and B (N).
     fn predict(&self, before: &Before) -> (f64, [f64; 3]);
     /// Sp (kg/(m3 s), ≥ 0) and Su (N/m3) of the cells, for a scheme that is not conservative.
