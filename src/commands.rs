@@ -5,6 +5,7 @@
 pub mod export;
 pub mod inspect;
 pub mod record;
+pub mod stability;
 
 use crate::config::{self, CaseFile, Config, Problem, Severity};
 use crate::couple::{Exchange, receive_mesh};

@@ -306,6 +306,7 @@ impl<T: Transport> Exchange<'_, T> {
             books: open.books,
             voidage: self.step.sources.voidage.clone(),
             velocity: fluid.velocity.clone(),
+            velocity_before: self.step.carried().2.to_vec(),
             ..State::default()
         }
     }
@@ -344,7 +345,7 @@ impl<T: Transport> Exchange<'_, T> {
                 "the DEM brought other particles back ({was} were saved, {now} came, or their values changed after read_restart)"
             )));
         }
-        self.step.restore(&s.voidage, &s.velocity, &[]);
+        self.step.restore(&s.voidage, &s.velocity, &s.velocity_before);
         self.send_sources(k, s.time)?;
         Ok(Open { row: s.row, books: s.books })
     }

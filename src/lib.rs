@@ -42,5 +42,7 @@ pub mod launch;
 pub mod monitor;
 pub mod output;
 pub mod partners;
+pub mod plot;
 pub mod record;
 pub mod setup;
+pub mod stability;

@@ -78,6 +78,26 @@ enum Command {
         #[arg(long, default_value_t = 1e-2)]
         accuracy: f64,
     },
+    /// Tells the largest fluid step each coupling scheme bears in a recorded scene
+    Stability {
+        /// recording, or folder of a case with one
+        file: PathBuf,
+        /// override a setting: section.key=value (repeatable)
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        set: Vec<String>,
+        /// recorded exchange to look at [default: 8 spread over the recording]
+        #[arg(long, value_name = "K")]
+        exchange: Option<i64>,
+        /// this scheme alone
+        #[arg(long, value_name = "NAME")]
+        scheme: Option<String>,
+        /// also draw growth over fluid step (stability-free.svg, stability-held.svg)
+        #[arg(long, value_name = "FOLDER")]
+        map: Option<PathBuf>,
+        /// also write all numbers to this file
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+    },
     /// Writes a recording as ParaView series or as CSV tables, with its monitor
     Export {
         /// recording
@@ -130,6 +150,12 @@ fn main() -> ExitCode {
             commands::record::replay(&file, &set, compare.as_deref(), save.as_deref())
         }
         Command::Inspect { file, set, accuracy } => commands::inspect::inspect(&file, &set, accuracy),
+        Command::Stability { file, set, exchange, scheme, map, json } => {
+            let (map, json) = (map.as_deref(), json.as_deref());
+            let options =
+                commands::stability::Options { set: &set, exchange, scheme: scheme.as_deref(), map, json };
+            commands::stability::stability(&file, &options)
+        }
         Command::Export { file, into, format, every } => {
             commands::export::export(&file, into.as_deref(), &format, every)
         }

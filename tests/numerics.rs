@@ -354,6 +354,19 @@ fn action_is_reaction_for_every_scheme_interpolation_and_model() {
 }
 
 #[test]
+fn a_capped_voidage_keeps_the_third_law() {
+    for hex in meshes() {
+        let plain = || setup("conservative", FluidVelocity::Gather, false);
+        let list = [message(&cloud(3000, SIZE, 4e-4))];
+        let least = exchange(&hex, false, &list, plain()).0.voidage.into_iter().fold(1.0, f64::min);
+        let floor = 0.5 * (1.0 + least);
+        let (sources, _, error) = exchange(&hex, false, &list, Setup { voidage_min: floor, ..plain() });
+        assert!(sources.voidage.contains(&floor), "the cap is met");
+        assert!(error < 1e-12, "{error:e}");
+    }
+}
+
+#[test]
 fn action_is_reaction_with_lift_added_mass_parcels_and_their_stress() {
     for hex in meshes() {
         let list = [message(&cloud(3000, SIZE, 4e-4))];
@@ -513,7 +526,7 @@ fn what_has_no_reaction_never_reaches_the_fluid_not_even_in_the_first_interval()
 }
 
 #[test]
-fn a_steady_cell_is_dragged_by_half_its_own_and_half_the_gathered_velocity() {
+fn a_steady_cell_is_dragged_by_shares_of_its_own_and_of_the_gathered_velocity() {
     // Su - Sp U = -G[K (u~ - v)] + (1 - theta) (G[K u~] - Sp U); explicit gives -G[K (u~ - v)], and with U = 0 G[K v]
     let mesh = assemble(&meshes()[3].whole()).unwrap();
     let f = fluid(&mesh);

@@ -60,7 +60,7 @@ pub fn companions() -> Result<Companions, String> {
     })
 }
 
-fn mpirun(ranks: u32, shared: &Path, export: &[&str]) -> Vec<String> {
+fn mpirun(ranks: u32, shared: &Path, own: &Path, export: &[&str]) -> Vec<String> {
     let mut c = vec!["mpirun".to_string()];
     let root = std::os::unix::fs::MetadataExt::uid(
         &std::fs::metadata("/proc/self").ok().unwrap_or_else(|| unreachable!("/proc is there on Linux")),
@@ -72,6 +72,8 @@ fn mpirun(ranks: u32, shared: &Path, export: &[&str]) -> Vec<String> {
     c.extend(["--oversubscribe", "--bind-to", "none", "--mca", "mpi_yield_when_idle", "1"].map(String::from));
     // Open MPI's own segments go where `janitor::clean` finds them, also after a kill
     c.extend(["--mca".into(), "btl_vader_backing_directory".into(), shared.display().to_string()]);
+    // all mpiruns of a user share one folder in /tmp: one that ends removes what another that starts is about to use
+    c.extend(["--mca".into(), "orte_tmpdir_base".into(), own.display().to_string()]);
     c.extend(export.iter().flat_map(|e| ["-x".to_string(), (*e).to_string()]));
     c.extend(["-np".to_string(), ranks.to_string()]);
     c
@@ -126,10 +128,15 @@ fn start(
     let shared =
         Path::new(voidage_shm::janitor::SHARED_MEMORY).join(voidage_shm::janitor::prefix(&s.token) + "mpi");
     std::fs::create_dir(&shared).map_err(|e| format!("{}: {e}", shared.display()))?;
-    let mut couple = mpirun(1, &shared, &[&session]);
+    let own = |group: &str| -> Result<PathBuf, String> {
+        let folder = s.root.join(group);
+        std::fs::create_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+        Ok(folder)
+    };
+    let mut couple = mpirun(1, &shared, &own("mc")?, &[&session]);
     couple.extend([text(&home.voidage), "couple".into(), text(&config.folder), "--resolved".into()]);
     couple.extend(from.iter().flat_map(|r| ["--restart".to_string(), text(&r.folder)]));
-    let mut dem = mpirun(f.run.dem_ranks, &shared, &[&session, &preload]);
+    let mut dem = mpirun(f.run.dem_ranks, &shared, &own("md")?, &[&session, &preload]);
     dem.extend([
         f.dem.program.clone(),
         "-in".into(),
@@ -141,7 +148,7 @@ fn start(
     let file = from.map_or_else(|| "none".into(), |r| text(&r.particles()));
     dem.extend(["-var", "voidage_restart", if from.is_some() { "1" } else { "0" }].map(String::from));
     dem.extend(["-var".into(), "voidage_restart_file".into(), file]);
-    let mut cfd = mpirun(f.run.cfd_ranks, &shared, &[&session, &foam]);
+    let mut cfd = mpirun(f.run.cfd_ranks, &shared, &own("mf")?, &[&session, &foam]);
     let solver = if f.fluid.solver == "voidageFoam" { text(&home.solver) } else { f.fluid.solver.clone() };
     cfd.extend([solver, "-case".into(), text(&config.fluid_case())]);
     if let Some(r) = from.filter(|_| f.fluid.solver == "voidageFoam") {

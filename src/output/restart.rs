@@ -3,7 +3,7 @@
 //!
 //! Together with the fluid's fields of the same time a set continues a run. `coupler` is written last: a set
 //! without it is incomplete. Layout: a line with the version, a TOML head with its length, voidage (1) and
-//! fluid velocity (m/s) by cell slot, and a checksum of all before. Knows no stage and no process.
+//! fluid velocity (m/s), with an added mass also that of the step before, by cell slot, and a checksum of all before. Knows no stage and no process.
 
 use crate::balance::Books;
 use crate::config::Config;
@@ -16,7 +16,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 /// First line; the number is the version of the layout.
-const MAGIC: &[u8] = b"voidage restart 1\n";
+const MAGIC: &[u8] = b"voidage restart 2\n";
 /// File of the coupler in a set.
 pub const COUPLER: &str = "coupler";
 /// File of the DEM in a set.
@@ -57,6 +57,9 @@ pub struct State {
     /// U at its end, m/s
     #[serde(skip)]
     pub velocity: Vec<[f64; 3]>,
+    /// U one step earlier, m/s; empty where nothing needs it
+    #[serde(skip)]
+    pub velocity_before: Vec<[f64; 3]>,
 }
 
 /// FNV-1a, 64 bits, over words: notices damage and mix-ups, not malice.
@@ -127,7 +130,7 @@ impl State {
         out.extend((head.len() as u64).to_le_bytes());
         out.extend(head.as_bytes());
         out.extend((self.voidage.len() as u64).to_le_bytes());
-        for x in self.voidage.iter().chain(self.velocity.iter().flatten()) {
+        for x in self.voidage.iter().chain(self.velocity.iter().chain(&self.velocity_before).flatten()) {
             out.extend(x.to_le_bytes());
         }
         let mut sum = Sum64::default();
@@ -145,7 +148,7 @@ impl State {
             return Err(format!(
                 "it begins with {:?}; this version reads {:?}",
                 what.trim(),
-                "voidage restart 1"
+                "voidage restart 2"
             ));
         }
         let damaged = || "it is damaged (checksum or length)".to_string();
@@ -166,12 +169,14 @@ impl State {
         let mut state: Self = toml::from_str(head).map_err(|e| e.message().to_string())?;
         let at = at + 8 + length;
         let n = word(at).ok_or_else(damaged)? as usize;
-        let numbers =
-            body.get(at + 8..).filter(|b| n.checked_mul(32) == Some(b.len())).ok_or_else(damaged)?;
+        let fits = |b: &&[u8]| [32, 56].iter().any(|bytes| n.checked_mul(*bytes) == Some(b.len()));
+        let numbers = body.get(at + 8..).filter(fits).ok_or_else(damaged)?;
         let mut numbers = numbers.chunks_exact(8).map(|c| c.try_into().map_or(f64::NAN, f64::from_le_bytes));
         state.voidage = numbers.by_ref().take(n).collect();
         let rest: Vec<f64> = numbers.collect();
-        state.velocity = rest.chunks_exact(3).map(|v| [v[0], v[1], v[2]]).collect();
+        let mut vectors = rest.chunks_exact(3).map(|v| [v[0], v[1], v[2]]);
+        state.velocity = vectors.by_ref().take(n).collect();
+        state.velocity_before = vectors.collect();
         Ok(state)
     }
 
@@ -290,8 +295,10 @@ mod tests {
 
     #[test]
     fn a_state_comes_back_to_the_bit() {
-        let s = state();
-        assert_eq!(State::decode(&s.encode().unwrap()).unwrap(), s);
+        for velocity_before in [vec![], vec![[5.0, 6.0, 7.0], [1e-9, 2.0, 3.0]]] {
+            let s = State { velocity_before, ..state() };
+            assert_eq!(State::decode(&s.encode().unwrap()).unwrap(), s);
+        }
     }
 
     #[test]
@@ -304,6 +311,6 @@ mod tests {
             assert!(State::decode(&bad).is_err(), "byte {cut}");
         }
         let e = State::decode(b"voidage restart 9\nxxxxxxxxxxxx").unwrap_err();
-        assert!(e.contains("voidage restart 9") && e.contains("voidage restart 1"), "{e}");
+        assert!(e.contains("voidage restart 9") && e.contains("voidage restart 2"), "{e}");
     }
 }

@@ -121,12 +121,23 @@ impl CouplingStep {
             let ratio = s.extra.ratio(&p.asked.kind, i);
             let parcel = ratio * ratio * ratio;
             let share = if s.model_b { parcel / b.slips[k].voidage } else { parcel };
-            let (v, inertia) = (p.velocity[i], p.mass[i]);
+            let v = p.velocity[i];
+            let inertia = p.mass[i] + self.added_mass(p, i, 1.0 - b.slips[k].voidage);
             let last = p.history.last(i, v, inertia, s.gravity, s.period);
             let drag_coefficient = b.drag[k] * share;
             let before = Before { drag_coefficient, slip: b.vectors[k], inertia, period: s.period, last };
             out.set(at + k, &Predicted::new(s.scheme, &before, b.defects[k], b.gathered[k]));
         }
+    }
+
+    /// Added mass of particle i (kg) where `solid` is the solid fraction: it takes part in what the particle's drag accelerates.
+    fn added_mass(&self, p: &Particles, i: usize, solid: f64) -> f64 {
+        let s = &self.setup;
+        if !s.extra.added() {
+            return 0.0;
+        }
+        let displaced = s.density * p.volume(i);
+        s.extra.coefficient(solid, p.mass[i] / displaced) * displaced
     }
 
     /// Lift, added mass and history with the fluid of the last step: part of the predicted impulse and of what drives the
@@ -149,18 +160,18 @@ impl CouplingStep {
         d.added_mass.resize(added, 0.0);
         d.memory.clear();
         d.memory.resize(if s.extra.history { memory } else { 0 }, Memory::default());
-        let coefficient = |i: usize| {
-            let solid = if s.extra.felderhof { self.weights.gather(&self.work, i)[0] } else { 0.0 };
-            s.extra.coefficient(solid, p.mass[i] / (p.volume(i) * s.density))
-        };
-        for (i, m) in d.added_mass.iter_mut().enumerate().take(inside) {
-            *m = coefficient(i) * s.density * p.volume(i);
+        let solid = |i: usize| if s.extra.felderhof { self.weights.gather(&self.work, i)[0] } else { 0.0 };
+        let coefficient = |i: usize| s.extra.coefficient(solid(i), p.mass[i] / (p.volume(i) * s.density));
+        let coefficients: Vec<f64> =
+            (0..if s.extra.felderhof { inside } else { 0 }).map(coefficient).collect();
+        for (i, m) in coefficients.iter().enumerate() {
+            d.added_mass[i] = m * s.density * p.volume(i);
         }
         let each = |i: usize| Each {
             radius: p.radius[i],
             ratio: s.extra.ratio(&p.asked.kind, i),
             slip: [0, 1, 2].map(|a| u[self.hosts[i] as usize][a] - p.velocity[i][a]),
-            added_mass: coefficient(i),
+            added_mass: coefficients.get(i).copied().unwrap_or(s.extra.added_mass),
         };
         let hosts = &self.hosts[..inside];
         s.extra.compute(&flow, hosts, each, &p.asked.memory, &mut self.extra, &mut d.memory);

@@ -52,6 +52,8 @@ pub struct CouplingStep {
     total: Vec<Lanes>,
     /// row, ε_s and lane 7 that particles are to read there
     read: Vec<(u32, f64, f64)>,
+    /// cells whose voidage was capped, and which share of their solids the fluid knows of
+    capped: Vec<(u32, f64)>,
     /// host cell of each particle
     hosts: Vec<u32>,
     order: Order,
@@ -119,6 +121,7 @@ impl CouplingStep {
             cells: Vec::new(),
             total: Vec::new(),
             read: Vec::new(),
+            capped: Vec::new(),
             hosts: Vec::new(),
             order: Order::default(),
             spare: Spare::default(),

@@ -27,14 +27,19 @@ impl CouplingStep {
         let grad = |field: &[[f64; 3]], j: usize| field.get(j).copied().unwrap_or_default();
         let pieces = threads::rows(&self.active.rows, self.classes.rows());
         let parts = threads::cut(&mut self.gathered, pieces.iter().map(|p| p.1.end));
-        let classes = &self.classes;
+        let (classes, capped) = (&self.classes, &self.capped);
+        // the fluid's equation has ε ∇p with the capped ε: solids in excess of it get none, or the third law breaks
+        let share = |j: usize| match capped.binary_search_by_key(&(j as u32), |c| c.0) {
+            Ok(i) => capped[i].1,
+            Err(_) => 1.0,
+        };
         threads::map(pieces.into_iter().zip(parts).collect(), |((rows, slots), gathered)| {
             for row in rows {
                 let j = classes.cell(*row);
                 let u = fluid.velocity[j];
                 let (p, t) = (grad(&fluid.pressure_gradient, j), grad(&fluid.stress_divergence, j));
-                gathered[*row as usize - slots.start] =
-                    [u[0], u[1], u[2], p[0] - t[0], p[1] - t[1], p[2] - t[2], 0.0, 0.0];
+                let r = [0, 1, 2].map(|a| share(j) * (p[a] - t[a]));
+                gathered[*row as usize - slots.start] = [u[0], u[1], u[2], r[0], r[1], r[2], 0.0, 0.0];
             }
         });
         self.smoothers[self.smoother].apply(

@@ -58,11 +58,13 @@ impl CouplingStep {
         // Σ V of ε_s, of ε_s U_s and of what is capped; largest ε_s; is one negative
         let found = threads::map(pieces.iter().zip(parts).collect(), |((rows, slots), (voidage, flux))| {
             let (mut sums, mut most, mut negative) = (Sums::<5>::default(), 0.0f64, false);
+            let mut cut = Vec::new();
             for j in rows.iter().map(|j| *j as usize) {
                 let (l, v, solid) = (&lanes[j], volumes[j], mean(j));
                 let (mut e, mut capped) = (1.0 - solid, 0.0);
                 if e < floor && floor > 0.0 {
                     (capped, e) = ((floor - e) * v, floor);
+                    cut.push((j as u32, (1.0 - floor) / solid));
                 }
                 negative |= solid < 0.0;
                 most = most.max(solid);
@@ -70,8 +72,10 @@ impl CouplingStep {
                 voidage[j - slots.start] = e;
                 flux[j - slots.start] = [l[1], l[2], l[3]];
             }
-            (sums, most, negative)
+            (sums, most, negative, cut)
         });
+        self.capped.clear();
+        found.iter().for_each(|f| self.capped.extend(&f.3));
         if other {
             // what particles read: all classes together; the mean, with the diameters of now
             for row in &self.active.rows {

@@ -40,10 +40,21 @@ pub fn room_for(bytes: usize) -> Result<(), String> {
 /// Removes the shared memory and the private folder of a run that has ended. Number of files removed.
 pub fn clean(session: &Session) -> io::Result<usize> {
     let removed = remove_shared(&session.token)?;
-    match std::fs::remove_dir_all(&session.root) {
-        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
-        _ => Ok(removed),
+    remove(&session.root)?;
+    Ok(removed)
+}
+
+/// Removes a folder in which an mpirun that ends may still be at work.
+fn remove(folder: &Path) -> io::Result<()> {
+    let mut result = Ok(());
+    for _ in 0..20 {
+        result = std::fs::remove_dir_all(folder);
+        if !folder.exists() {
+            return Ok(());
+        }
+        std::thread::sleep(std::time::Duration::from_millis(50));
     }
+    result
 }
 
 fn remove_shared(token: &str) -> io::Result<usize> {
@@ -81,7 +92,7 @@ pub fn clean_dead() -> io::Result<Vec<String>> {
         };
         if dead && !token.is_empty() {
             remove_shared(&token)?;
-            std::fs::remove_dir_all(&root)?;
+            remove(&root)?;
             gone.push(token);
         }
     }
