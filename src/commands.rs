@@ -5,6 +5,7 @@
 pub mod export;
 pub mod inspect;
 pub mod record;
+pub mod report;
 pub mod stability;
 
 use crate::config::{self, CaseFile, Config, Problem, Severity};

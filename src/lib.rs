@@ -44,5 +44,6 @@ pub mod output;
 pub mod partners;
 pub mod plot;
 pub mod record;
+pub mod report;
 pub mod setup;
 pub mod stability;

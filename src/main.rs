@@ -98,6 +98,23 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
     },
+    /// Writes one page (HTML) about a run, to be read in a browser
+    Report {
+        /// recording, or folder of a case that ran
+        file: PathBuf,
+        /// folder for report.html and its pictures [default: CASE/report, or beside the recording]
+        #[arg(long, value_name = "FOLDER")]
+        into: Option<PathBuf>,
+        /// terms above it matter
+        #[arg(long, default_value_t = 1e-2)]
+        accuracy: f64,
+        /// show what `voidage tune --json FILE` found
+        #[arg(long, value_name = "FILE")]
+        tune: Option<PathBuf>,
+        /// show what `voidage stability --json FILE` found
+        #[arg(long, value_name = "FILE")]
+        stability: Option<PathBuf>,
+    },
     /// Writes a recording as ParaView series or as CSV tables, with its monitor
     Export {
         /// recording
@@ -155,6 +172,11 @@ fn main() -> ExitCode {
             let options =
                 commands::stability::Options { set: &set, exchange, scheme: scheme.as_deref(), map, json };
             commands::stability::stability(&file, &options)
+        }
+        Command::Report { file, into, accuracy, tune, stability } => {
+            let (into, tune, stability) = (into.as_deref(), tune.as_deref(), stability.as_deref());
+            let options = commands::report::Options { into, accuracy, tune, stability };
+            commands::report::report(&file, &options)
         }
         Command::Export { file, into, format, every } => {
             commands::export::export(&file, into.as_deref(), &format, every)

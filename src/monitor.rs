@@ -119,6 +119,43 @@ impl Monitor {
     }
 }
 
+/// Rows of a file; the error says which line is none.
+pub fn read(path: &Path) -> Result<Vec<Row>, String> {
+    let text = std::fs::read_to_string(path).map_err(|e| e.to_string())?;
+    let mut lines = text.lines().enumerate();
+    let names: Vec<&str> = COLUMNS.iter().map(|c| c.0).collect();
+    if lines.next().is_none_or(|l| l.1 != names.join(",")) {
+        return Err("its first line is not that of a monitor of this version".into());
+    }
+    let row = |(i, line): (usize, &str)| {
+        let w: Vec<&str> = line.split(',').collect();
+        let number = |k: usize| w.get(k).and_then(|x| x.parse::<f64>().ok());
+        let whole = |k: usize| w.get(k).and_then(|x| x.parse::<u64>().ok());
+        let row = || {
+            Some(Row {
+                step: w[0].parse().ok()?,
+                time: number(1)?,
+                particles: whole(2)? as usize,
+                solid_fraction_max: number(3)?,
+                solid_volume_error: number(4)?,
+                solid_momentum_error: number(5)?,
+                action_reaction_error: number(6),
+                ledger_momentum: number(7)?,
+                ledger_left: number(8)?,
+                positive_redone: whole(9)?,
+                excluded: whole(10)?,
+                capped_volume: number(11)?,
+                coupler: number(12)?,
+                wait_dem: number(13)?,
+                wait_cfd: number(14)?,
+                given: [number(15)?, number(16)?, number(17)?],
+            })
+        };
+        row().ok_or_else(|| format!("line {} is not a row", i + 1))
+    };
+    lines.map(row).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -131,6 +168,10 @@ mod tests {
         drop(m);
         Monitor::create(&path, true).unwrap().write(&Row::default()).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
+        let rows = read(&path).unwrap();
+        assert_eq!(rows, [Row { action_reaction_error: Some(1e-14), ..Row::default() }, Row::default()]);
+        std::fs::write(&path, text.clone() + "1,2,three\n").unwrap();
+        assert_eq!(read(&path).unwrap_err(), "line 4 is not a row");
         std::fs::remove_file(&path).unwrap();
         let lines: Vec<_> = text.lines().collect();
         assert_eq!(lines.len(), 3, "a restart appends");

@@ -90,7 +90,11 @@ impl Scale {
     fn text(v: f64) -> String {
         let short = format!("{v:.4}");
         let short = short.trim_end_matches('0').trim_end_matches('.');
-        if v == 0.0 || (1e-3..1e5).contains(&v.abs()) { short.into() } else { format!("{v:.0e}") }
+        if v == 0.0 || (1e-3..1e5).contains(&v.abs()) {
+            short.into()
+        } else {
+            format!("{v:.1e}").replace(".0e", "e")
+        }
     }
 }
 
@@ -216,5 +220,6 @@ mod tests {
             }
         }
         assert_eq!([0.0, 0.25, 1e-7, 20.0].map(Scale::text), ["0", "0.25", "1e-7", "20"]);
+        assert_eq!(Scale::text(1.5e-8), "1.5e-8");
     }
 }

@@ -20,3 +20,24 @@ pub fn copy(from: &Path, to: &Path) {
         }
     }
 }
+
+/// A scratch folder, removed at the end.
+pub struct Folder(PathBuf);
+impl Folder {
+    /// New and empty.
+    pub fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("voidage-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&path);
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+}
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
