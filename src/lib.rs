@@ -44,3 +44,4 @@ pub mod output;
 pub mod partners;
 pub mod record;
 pub mod setup;
+pub mod tune;
