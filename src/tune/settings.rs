@@ -67,21 +67,26 @@ impl Settings {
         all.extend(own.map(|(k, v)| (k.to_string(), v)));
         all
     }
-    /// The sections of case.toml that say so, with the other keys of these sections as they are in the case.
+    /// The sections of case.toml that say so, with what else the case has in them; zeros and empty lists, which are
+    /// defaults, are left out.
     pub fn section(&self, c: &Config) -> Result<String, toml::ser::Error> {
-        #[derive(Serialize)]
-        struct Section {
-            map: Map,
-            smooth: Smooth,
-            interpolate: Interpolate,
-        }
         let f = &c.file;
         let (method, tolerance) = (self.smoother.clone(), self.tolerance);
-        toml::to_string(&Section {
-            map: Map { method: self.mapping.clone(), grid: self.grid },
-            smooth: Smooth { method, tolerance, ..f.smooth.clone() },
-            interpolate: Interpolate { fluid_velocity: self.interpolation.clone() },
-        })
+        let map = Map { method: self.mapping.clone(), grid: self.grid };
+        let smooth = Smooth { method, tolerance, ..f.smooth.clone() };
+        let interpolate = Interpolate { fluid_velocity: self.interpolation.clone() };
+        let mut all = toml::Table::new();
+        for (name, mut table) in [
+            ("map", toml::Table::try_from(map)?),
+            ("smooth", toml::Table::try_from(smooth)?),
+            ("interpolate", toml::Table::try_from(interpolate)?),
+        ] {
+            let empty =
+                |v: &toml::Value| v.as_float() == Some(0.0) || v.as_array().is_some_and(Vec::is_empty);
+            table.retain(|_, v| !empty(v));
+            all.insert(name.into(), toml::Value::Table(table));
+        }
+        toml::to_string(&all)
     }
     /// For tables.
     pub fn name(&self) -> String {

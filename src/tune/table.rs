@@ -4,8 +4,9 @@
 //! Reads a finished search; writes text. Times in ms of CPU per exchange, errors relative. Does not measure.
 
 use super::estimate::Estimates;
+use super::search::Search;
 use super::settings::Settings;
-use super::{Ask, MARGIN, Point, Search, choose};
+use super::{Ask, MARGIN, Point, choose};
 use crate::config::Config;
 use crate::record::effect::Error;
 use crate::record::replay::ReplayError;
