@@ -137,9 +137,17 @@ pub struct Start {
     pub k: i64,
     /// byte at which it begins
     offset: u64,
-    /// what the exchange before left: voidage, fluid velocity and that of one step earlier, m/s; none where the recording
-    /// has it, or nothing is needed
-    left: Option<(Vec<f64>, [Vec<[f64; 3]>; 2])>,
+    /// what the exchange before left; none where the recording has it
+    left: Option<Left>,
+}
+
+/// What an exchange leaves to the next one (`CouplingStep::carried`), by cell slot.
+#[derive(Clone, Debug, PartialEq)]
+struct Left {
+    voidage: Vec<f64>,
+    /// fluid velocity, and that of one step earlier, m/s
+    velocity: Vec<[f64; 3]>,
+    earlier: Vec<[f64; 3]>,
 }
 
 impl Start {
@@ -154,12 +162,12 @@ impl Start {
             && let Some(x) = m.at(first - 1)?
         {
             let voidage = x.sources(&m.mesh)?.voidage;
-            let now = x.fluid(&m.mesh)?.velocity;
-            let before = match m.exchange(k - 2)? {
+            let velocity = x.fluid(&m.mesh)?.velocity;
+            let earlier = match m.exchange(k - 2)? {
                 Some(x) => x.fluid(&m.mesh)?.velocity,
-                None => now.clone(),
+                None => velocity.clone(),
             };
-            left = Some((voidage, [now, before]));
+            left = Some(Left { voidage, velocity, earlier });
         }
         Ok(Some(Self { k, offset, left }))
     }
@@ -272,8 +280,8 @@ pub fn each<R: Read + Seek + 'static>(
     let mut before: Option<i64> = None;
     if let Some(s) = start {
         player.borrow_mut().seek(s.offset)?;
-        if let Some((voidage, [now, earlier])) = &s.left {
-            run.step.restore(voidage, now, earlier);
+        if let Some(l) = &s.left {
+            run.step.restore(&l.voidage, &l.velocity, &l.earlier);
             before = Some(s.k - 1);
         }
     }

@@ -15,6 +15,9 @@ use std::io::{Read, Seek};
 /// Opens the recording; every replay reads it anew.
 pub type Open<'a, R> = &'a dyn Fn() -> Result<Reader<R>, RecordError>;
 
+/// Told of an exchange's replies and of the times so far (s); false: the replay ends with it.
+pub type Watch<'a> = dyn FnMut(Effect, &[f64]) -> Result<bool, ReplayError> + 'a;
+
 /// What is replayed.
 pub struct Bench<'a, R: Read + Seek> {
     /// the recording
@@ -63,11 +66,7 @@ impl<'a, R: Read + Seek + 'static> Bench<'a, R> {
     }
 
     /// Replays with these settings; `visit` sees every exchange and ends the replay with false.
-    pub fn replay(
-        &mut self,
-        settings: &Settings,
-        visit: &mut dyn FnMut(Effect, &[f64]) -> Result<bool, ReplayError>,
-    ) -> Result<Replayed, ReplayError> {
+    pub fn replay(&mut self, settings: &Settings, visit: &mut Watch) -> Result<Replayed, ReplayError> {
         let (mut cpu, reader, most) = (Vec::new(), (self.open)()?, self.exchanges);
         let (overrides, start) = (settings.overrides(self.base), self.start.clone());
         let outcome = each(reader, &overrides, None, start.as_ref(), &mut |x| {

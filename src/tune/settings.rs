@@ -119,7 +119,7 @@ impl Part {
 
 /// The case's mapping first, then all others; `diameter`: of the largest particle, m.
 pub fn mappings(case: &Settings, diameter: f64) -> Vec<Settings> {
-    let other = |m: &Box<dyn map::Mapping>| {
+    let other = |m: &dyn map::Mapping| {
         // two to three particle diameters, as the case's reference says
         let grid = if case.grid > 0.0 { case.grid } else { 2.5 * diameter };
         // mappings without a grid do not look at it
@@ -128,7 +128,7 @@ pub fn mappings(case: &Settings, diameter: f64) -> Vec<Settings> {
         Settings { mapping: m.name().into(), grid, smoother, ..case.clone() }
     };
     let all = map::all();
-    let others = all.iter().filter(|m| m.name() != case.mapping).map(other);
+    let others = all.iter().filter(|m| m.name() != case.mapping).map(|m| other(&**m));
     std::iter::once(case.clone()).chain(others).collect()
 }
 
