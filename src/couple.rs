@@ -167,6 +167,13 @@ pub struct Course {
     pub summary: Summary,
 }
 
+impl Course {
+    /// The fluid at the end of the last step.
+    pub fn fluid(&self) -> &Fluid {
+        &self.fluid
+    }
+}
+
 /// A row that waits for the DEM's report on the interval it is about.
 struct Open {
     row: Row,

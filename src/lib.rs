@@ -47,3 +47,4 @@ pub mod record;
 pub mod report;
 pub mod setup;
 pub mod stability;
+pub mod tune;

@@ -115,6 +115,32 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         stability: Option<PathBuf>,
     },
+    /// Measures on a recording what the settings cost and how exact they are, and tells the cheapest that are exact enough
+    Tune {
+        /// recording
+        file: PathBuf,
+        /// largest numerical error of voidage, forces and momentum source, relative in L2
+        #[arg(long)]
+        accuracy: f64,
+        /// override a setting of all candidates: section.key=value (repeatable)
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        set: Vec<String>,
+        /// the last exchanges of the recording that are replayed
+        #[arg(long, default_value_t = 12)]
+        exchanges: usize,
+        /// vary only this: mapping, smoother or interpolation (repeatable)
+        #[arg(long, value_name = "WHAT")]
+        only: Vec<String>,
+        /// write the sections of case.toml to this file
+        #[arg(long, value_name = "FILE")]
+        write: Option<PathBuf>,
+        /// also write all numbers to this file (fields: src/tune/table.rs)
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+        /// print all candidates, not only the front
+        #[arg(long)]
+        all: bool,
+    },
     /// Writes a recording as ParaView series or as CSV tables, with its monitor
     Export {
         /// recording
@@ -177,6 +203,10 @@ fn main() -> ExitCode {
             let (into, tune, stability) = (into.as_deref(), tune.as_deref(), stability.as_deref());
             let options = commands::report::Options { into, accuracy, tune, stability };
             commands::report::report(&file, &options)
+        Command::Tune { file, accuracy, set, exchanges, only, write, json, all } => {
+            let (write, json) = (write.as_deref(), json.as_deref());
+            let o = commands::tune::Options { set: &set, accuracy, exchanges, only: &only, write, json, all };
+            commands::tune::tune(&file, &o)
         }
         Command::Export { file, into, format, every } => {
             commands::export::export(&file, into.as_deref(), &format, every)

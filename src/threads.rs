@@ -4,6 +4,7 @@
 //! their order: threads do not change a bit.
 
 use rayon::prelude::*;
+use rustix::time::{ClockId, clock_gettime};
 use std::ops::Range;
 
 /// Rows per piece of a loop over cells.
@@ -20,6 +21,15 @@ pub fn within<R: Send>(pool: Option<&rayon::ThreadPool>, work: impl FnOnce() -> 
         Some(pool) => pool.install(work),
         None => work(),
     }
+}
+
+/// CPU time so far of the calling thread and of the threads of a pool, s.
+pub fn cpu_seconds(pool: Option<&rayon::ThreadPool>) -> f64 {
+    let own = || {
+        let t = clock_gettime(ClockId::ThreadCPUTime);
+        t.tv_sec as f64 + 1e-9 * t.tv_nsec as f64
+    };
+    own() + pool.map_or(0.0, |p| p.broadcast(|_| own()).iter().sum())
 }
 
 /// `f` of every part; the results in the order of the parts.

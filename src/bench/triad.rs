@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The machine's own memory bandwidth: a_i = b_i + s c_i on three arrays, as STREAM does.
 
-use rustix::time::{ClockId, clock_gettime};
+use crate::threads;
 
 /// CPU time of the calling thread so far, s.
 pub fn cpu_seconds() -> f64 {
-    let t = clock_gettime(ClockId::ThreadCPUTime);
-    t.tv_sec as f64 + 1e-9 * t.tv_nsec as f64
+    threads::cpu_seconds(None)
 }
 
 /// GB/s of the triad on `bytes` in all three arrays together; counted: two reads and one write. CPU time of the slowest

@@ -174,7 +174,10 @@ fn report(o: &Outcome, file: &Path, compare: Option<&Path>, set: &[(String, Stri
         );
     }
     let per = 1e3 * o.summary.coupler / o.exchanges as f64;
-    println!("coupler {per:.3} ms per exchange with reading; replay {wall:.2} s in all");
+    let cpu = 1e3 * o.cpu / o.exchanges as f64;
+    println!(
+        "coupler {per:.3} ms per exchange with reading, {cpu:.3} ms of CPU without; replay {wall:.2} s in all"
+    );
     let s = &o.seconds;
     let stages = [
         ("locate", s.locate),

@@ -53,6 +53,9 @@ impl Mapping for Kernel {
     fn properties(&self) -> &'static str {
         "conservative, positive, continuous; second-degree quadrature; (8 b/h)^3 cells, milliseconds per particle"
     }
+    fn smooths(&self) -> bool {
+        true
+    }
     fn prepare(&mut self, mesh: &Mesh, options: &Options) {
         self.cells = Cells::new(mesh);
         self.bandwidth = options.bandwidth;

@@ -48,6 +48,10 @@ pub trait Mapping: Send + Sync {
     fn link_variance(&self, _mesh: &Mesh) -> Vec<f64> {
         Vec::new()
     }
+    /// The deposit has the bandwidth already: nothing is to be smoothed after it.
+    fn smooths(&self) -> bool {
+        false
+    }
     /// Σ_k m_ik = 1 to rounding.
     fn conservative(&self) -> bool {
         true

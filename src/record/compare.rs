@@ -55,7 +55,7 @@ impl Difference {
     pub fn relative_largest(&self) -> f64 {
         crate::balance::ratio(self.largest, self.greatest)
     }
-    fn add(&mut self, got: &[f64], due: &[f64], k: i64, place: impl Fn(usize) -> i64) {
+    pub(super) fn add(&mut self, got: &[f64], due: &[f64], k: i64, place: impl Fn(usize) -> i64) {
         self.exchanges += 1;
         self.values += got.len() as u64;
         for (i, (a, b)) in got.iter().zip(due).enumerate() {

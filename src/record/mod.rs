@@ -3,16 +3,18 @@
 //!
 //! `chunk` is the container (versioned, checksummed, append-only), `head` what stands at the head of a chunk, `pack` the
 //! compression; `write` records a live run behind `transport`, `read` reads a file as a stream. `replay` feeds one to the
-//! coupling step itself (`couple`), `moment` decodes one exchange, `compare` sets two side by side, `forecast` tells the
+//! coupling step itself (`couple`), through `player`, `moment` decodes one exchange, `compare` sets two side by side, `forecast` tells the
 //! size before. Layout: `docs/recording.md`. Knows no processes and no shared memory.
 
 pub mod chunk;
 pub mod compare;
+pub mod effect;
 pub mod exercise;
 pub mod forecast;
 pub mod head;
 pub mod moment;
 mod pack;
+pub mod player;
 pub mod read;
 pub mod replay;
 pub mod transport;

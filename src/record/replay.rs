@@ -4,23 +4,23 @@
 //!
 //! Memory is bounded by one exchange. Reads no clock but to time the coupler, writes nothing unless `save` is given.
 
-use super::compare::{Comparison, Replies, is_reply};
+use super::compare::{Comparison, Replies};
 use super::moment::{Messages, Moments};
-use super::{Chunk, Head, Reader, RecordError, Recorded, Recorder};
+use super::player::{Begin, Played, Player};
+use super::{Reader, RecordError, Recorded, Recorder};
 use crate::config::{self, Config, Problem, Severity, foam};
 use crate::couple::{Course, Exchange, Summary, receive_mesh};
+use crate::mesh::Mesh;
 use crate::output::restart::Sets;
 use crate::partners::Partners;
-use crate::setup;
-use crate::step::Seconds;
+use crate::step::{Fluid, Seconds};
+use crate::{setup, threads};
 use std::cell::RefCell;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 use std::rc::Rc;
 use std::time::Duration;
 use thiserror::Error;
-use voidage_wire::memory::Words;
-use voidage_wire::{Frame, Transport, TransportError, Welcome, field, hello, kind};
 
 /// Why a recording was not replayed.
 #[derive(Debug, Error)]
@@ -54,146 +54,10 @@ pub struct Outcome {
     pub cut: Option<u64>,
     /// the run's own summary; `coupler` is the time of the step in the replay, s
     pub summary: Summary,
+    /// CPU time of the coupler without reading the file, s
+    pub cpu: f64,
     /// time of the stages, sums over the exchanges, s
     pub seconds: Seconds,
-}
-
-/// A message that begins an exchange, read ahead.
-struct Begin {
-    k: i64,
-    time: f64,
-    /// voidage, velocity and velocity before, in one array
-    state: Option<(usize, Vec<u64>)>,
-}
-
-/// Feeds recorded messages to the transports.
-struct Player<R: Read + Seek> {
-    reader: Reader<R>,
-    queues: Vec<VecDeque<Vec<u64>>>,
-    begin: Option<Begin>,
-    /// the exchange at hand as recorded, and as answered anew
-    recorded: Messages,
-    anew: Messages,
-    /// what the recorded partners were told
-    told: BTreeMap<String, f64>,
-    ended: bool,
-    error: Option<RecordError>,
-}
-
-impl<R: Read + Seek> Player<R> {
-    /// Reads one chunk and puts it where it belongs; false: an exchange begins, or the file ends.
-    fn read(&mut self) -> Result<bool, RecordError> {
-        if self.begin.is_some() || self.ended {
-            return Ok(false);
-        }
-        let Some(chunk) = self.reader.next()? else {
-            self.ended = true;
-            return Ok(false);
-        };
-        if let Head::Exchange { k, time } = chunk.head {
-            let mut begin = Begin { k, time, state: None };
-            // what the step carries follows at once, if it is there
-            if let Some(next) = self.reader.next()? {
-                match next.head {
-                    Head::State { cells, .. } => begin.state = Some((cells as usize, next.words)),
-                    _ => self.take(next)?,
-                }
-            }
-            self.begin = Some(begin);
-            return Ok(false);
-        }
-        self.take(chunk)?;
-        Ok(true)
-    }
-
-    fn take(&mut self, Chunk { head, words, offset }: Chunk) -> Result<(), RecordError> {
-        let Head::Message { partner, sent, kind, step } = head else { return Ok(()) };
-        if partner as usize >= self.queues.len() {
-            return Err(RecordError::Damaged { offset, what: format!("a message of partner {partner}") });
-        }
-        if step == self.recorded.k && (is_reply(kind) || kind == kind::PARTICLES) {
-            self.recorded.add(partner, kind, words.clone());
-        }
-        if kind == kind::WELCOME {
-            let text = Frame::parse(&words).and_then(|f| f.bytes(field::TEXT).map(<[u8]>::to_vec));
-            let what = |what: String| RecordError::Damaged { offset, what };
-            let text = text.map_err(|e| what(e.to_string()))?;
-            self.told = hello::decode::<Welcome>(&text).map_err(what)?.settings;
-        }
-        if !sent {
-            self.queues[partner as usize].push_back(words);
-        }
-        Ok(())
-    }
-
-    /// The next exchange of the file; messages of earlier ones are dropped.
-    fn next_exchange(&mut self) -> Result<Option<Begin>, RecordError> {
-        while self.read()? {}
-        let begin = self.begin.take();
-        if let Some(b) = &begin {
-            (self.recorded, self.anew) = (Messages::new(b.k, b.time), Messages::new(b.k, b.time));
-            for (i, q) in self.queues.iter_mut().enumerate() {
-                q.retain(|w| w.get(2).is_some_and(|step| *step as i64 >= b.k));
-                for w in q.iter().filter(|w| w[2] as i64 == b.k && w[1] == u64::from(kind::PARTICLES)) {
-                    self.recorded.add(i as u32, kind::PARTICLES, w.clone());
-                }
-            }
-        }
-        Ok(begin)
-    }
-
-    fn receive(&mut self, i: usize) -> Result<Option<Vec<u64>>, RecordError> {
-        while self.queues[i].is_empty() {
-            // in the handshake, messages of the first exchange may be read ahead of its begin
-            if !self.read()? {
-                return Ok(None);
-            }
-        }
-        let words = self.queues[i].pop_front();
-        if let Some(w) = words.as_ref().filter(|w| w.get(1) == Some(&u64::from(kind::PARTICLES))) {
-            self.anew.add(i as u32, kind::PARTICLES, w.clone());
-        }
-        Ok(words)
-    }
-}
-
-/// The partner's end of a recorded channel.
-struct Played<R: Read + Seek> {
-    player: Rc<RefCell<Player<R>>>,
-    partner: usize,
-    peer: String,
-}
-
-impl<R: Read + Seek> Transport for Played<R> {
-    type Loan = Words;
-    type Sample = Words;
-    fn peer(&self) -> &str {
-        &self.peer
-    }
-    fn loan(&mut self, words: usize) -> Result<Words, TransportError> {
-        Ok(Words(vec![0; words]))
-    }
-    fn send(&mut self, loan: Words) -> Result<(), TransportError> {
-        let kind = loan[1] as u32;
-        if is_reply(kind) {
-            self.player.borrow_mut().anew.add(self.partner as u32, kind, loan.0);
-        }
-        Ok(())
-    }
-    fn receive(&mut self, _: Duration) -> Result<Option<Words>, TransportError> {
-        let mut player = self.player.borrow_mut();
-        let fail = |why: &str| TransportError::System { what: "read the recording", why: why.into() };
-        match player.receive(self.partner) {
-            Ok(Some(words)) => Ok(Some(Words(words))),
-            Ok(None) if player.ended => Err(fail("it ends here")),
-            Ok(None) => Err(fail("the next message is not in it")),
-            Err(e) => {
-                let text = e.to_string();
-                player.error = Some(e);
-                Err(fail(&text))
-            }
-        }
-    }
 }
 
 /// Sections and keys that say how the recorded programs ran, not what the coupling step does with their messages.
@@ -266,30 +130,105 @@ pub struct Options<'a, R: Read + Seek> {
     pub save: Option<(&'a std::path::Path, config::Compression)>,
 }
 
+/// Where a replay begins, if not at the first exchange.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Start {
+    /// exchange
+    pub k: i64,
+    /// byte at which it begins
+    offset: u64,
+    /// what the exchange before left; none where the recording has it
+    left: Option<Left>,
+}
+
+/// What an exchange leaves to the next one (`CouplingStep::carried`), by cell slot.
+#[derive(Clone, Debug, PartialEq)]
+struct Left {
+    voidage: Vec<f64>,
+    /// fluid velocity, and that of one step earlier, m/s
+    velocity: Vec<[f64; 3]>,
+    earlier: Vec<[f64; 3]>,
+}
+
+impl Start {
+    /// At the last `n` exchanges of a recording; none if it has no more. What is carried into the first of them comes
+    /// from the replies and the fluid recorded before it.
+    pub fn last<R: Read + Seek>(reader: Reader<R>, n: usize) -> Result<Option<Self>, RecordError> {
+        let mut m = Moments::new(reader)?;
+        let Some(first) = m.exchanges.len().checked_sub(n.max(1)).filter(|f| *f > 0) else { return Ok(None) };
+        let (k, offset) = m.exchanges[first];
+        let mut left = None;
+        if m.exchanges[first - 1].0 == k - 1
+            && let Some(x) = m.at(first - 1)?
+        {
+            let voidage = x.sources(&m.mesh)?.voidage;
+            let velocity = x.fluid(&m.mesh)?.velocity;
+            let earlier = match m.exchange(k - 2)? {
+                Some(x) => x.fluid(&m.mesh)?.velocity,
+                None => velocity.clone(),
+            };
+            left = Some(Left { voidage, velocity, earlier });
+        }
+        Ok(Some(Self { k, offset, left }))
+    }
+}
+
+/// One exchange replayed.
+pub struct Exchanged<'a> {
+    /// exchange
+    pub k: i64,
+    /// the messages with the replies recorded, and with those of the replay
+    pub recorded: &'a Messages,
+    /// see `recorded`
+    pub anew: &'a Messages,
+    /// of all CFD ranks
+    pub mesh: &'a Mesh,
+    /// at the end of its step, by cell slot
+    pub fluid: &'a Fluid,
+    /// CPU time of the coupler without reading the file, all its threads, s
+    pub cpu: f64,
+}
+
 /// Replays a recording; `progress` is told each exchange.
 pub fn replay<R: Read + Seek + 'static>(
     reader: Reader<R>,
     options: Options<R>,
     progress: &mut dyn FnMut(i64),
 ) -> Result<Outcome, ReplayError> {
-    let config = case(&reader, options.overrides)?;
+    let (mut comparison, mut reference) = (Comparison::default(), options.reference);
+    let mut compare = |x: &Exchanged| {
+        let of = |m| Replies::of(m, &x.mesh.slots, x.mesh.len());
+        let got = of(x.anew)?;
+        match &mut reference {
+            None => comparison.add(&got, &of(x.recorded)?)?,
+            Some(r) => match r.exchange(x.k)? {
+                Some(m) => comparison.add(&got, &Replies::of(&m, &r.mesh.slots, r.mesh.len())?)?,
+                None => comparison.unmatched += 1,
+            },
+        }
+        progress(x.k);
+        Ok(true)
+    };
+    let out = each(reader, options.overrides, options.save, None, &mut compare)?;
+    Ok(Outcome { comparison, ..out })
+}
+
+/// Told of an exchange; false: the replay ends with it.
+pub type Visit<'a> = dyn FnMut(&Exchanged) -> Result<bool, ReplayError> + 'a;
+
+/// Replays a recording from `start` on and shows every exchange to `visit`; the outcome has no comparison.
+pub fn each<R: Read + Seek + 'static>(
+    reader: Reader<R>,
+    overrides: &[(String, String)],
+    save: Option<(&std::path::Path, config::Compression)>,
+    start: Option<&Start>,
+    visit: &mut Visit,
+) -> Result<Outcome, ReplayError> {
+    let config = case(&reader, overrides)?;
     let session = reader.session.clone();
     let (dem, cfd) = (session.dem_ranks as usize, session.cfd_ranks as usize);
-    let queues = (0..dem + cfd).map(|_| VecDeque::new()).collect();
-    let empty = || Messages::new(i64::MIN, 0.0);
-    let (recorded, anew) = (empty(), empty());
-    let player = Player {
-        reader,
-        queues,
-        begin: None,
-        recorded,
-        anew,
-        told: BTreeMap::new(),
-        ended: false,
-        error: None,
-    };
-    let player = Rc::new(RefCell::new(player));
-    let recorder = match options.save {
+    let player = Rc::new(RefCell::new(Player::new(reader)));
+    let recorder = match save {
         None => None,
         Some((path, how)) => {
             let all = super::Selection { every: 1, first: 0, last: 0, steps: 0 };
@@ -319,7 +258,7 @@ pub fn replay<R: Read + Seek + 'static>(
         partners.welcome(i, &welcome).map_err(|e| told(&e))?;
     }
     let mesh = receive_mesh(&mut partners).map_err(|e| told(&e))?;
-    let (slots, cells) = (mesh.slots.clone(), mesh.len());
+    let cells = mesh.len();
     let step = setup::step(&config, mesh).map_err(ReplayError::Run)?;
     let mut run = Exchange {
         partners,
@@ -338,13 +277,21 @@ pub fn replay<R: Read + Seek + 'static>(
         write: &mut |_| Ok(()),
     };
     let (mut course, mut out) = (Course::default(), Outcome::default());
-    let mut reference = options.reference;
     let mut before: Option<i64> = None;
+    if let Some(s) = start {
+        player.borrow_mut().seek(s.offset)?;
+        if let Some(l) = &s.left {
+            run.step.restore(&l.voidage, &l.velocity, &l.earlier);
+            before = Some(s.k - 1);
+        }
+    }
+    let mut checked = false;
     loop {
         let next = player.borrow_mut().next_exchange()?;
         let Some(Begin { k, state, .. }) = next else { break };
-        if before.is_none() {
+        if !checked {
             missing(&config, &player.borrow().told)?;
+            checked = true;
         }
         let carry = |what: &str| RecordError::Content { k, what: what.into() };
         match state {
@@ -360,7 +307,11 @@ pub fn replay<R: Read + Seek + 'static>(
             None if k == 0 || before == Some(k - 1) => {}
             None => return Err(carry("what the exchange before left is not in the recording").into()),
         }
+        let clock = |run: &Exchange<_>| threads::cpu_seconds(run.pool.as_ref());
+        player.borrow_mut().reading = 0.0;
+        let begin = clock(&run);
         let result = run.exchange(k, &mut course);
+        let cpu = clock(&run) - begin - player.borrow().reading;
         if let Err(e) = result {
             let mut p = player.borrow_mut();
             if let Some(e) = p.error.take() {
@@ -379,19 +330,15 @@ pub fn replay<R: Read + Seek + 'static>(
         if p.ended && !whole {
             break;
         }
-        let got = Replies::of(&p.anew, &slots, cells)?;
-        match &mut reference {
-            None => out.comparison.add(&got, &Replies::of(&p.recorded, &slots, cells)?)?,
-            Some(r) => match r.exchange(k)? {
-                Some(m) => out.comparison.add(&got, &Replies::of(&m, &r.mesh.slots, r.mesh.len())?)?,
-                None => out.comparison.unmatched += 1,
-            },
-        }
+        let (recorded, anew, mesh, fluid) = (&p.recorded, &p.anew, &run.step.mesh, course.fluid());
+        let more = visit(&Exchanged { k, recorded, anew, mesh, fluid, cpu })?;
+        out.cpu += cpu;
         out.exchanges += 1;
         out.range = Some((out.range.map_or(k, |r| r.0), k));
         before = Some(k);
-        drop(p);
-        progress(k);
+        if !more {
+            break;
+        }
     }
     if out.exchanges == 0 {
         return Err(RecordError::NoExchange.into());

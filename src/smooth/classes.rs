@@ -49,6 +49,10 @@ impl Classes {
     pub fn of(&self, radius: f64) -> usize {
         self.limits.iter().filter(|d| 2.0 * radius > **d).count()
     }
+    /// b of a particle, m.
+    pub fn bandwidth(&self, radius: f64) -> f64 {
+        self.bandwidths[self.of(radius)]
+    }
     /// Cell of a row.
     pub fn cell(&self, row: u32) -> usize {
         if self.count() == 1 { row as usize } else { row as usize % self.cells }
