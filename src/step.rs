@@ -7,10 +7,12 @@
 //! results, except the last fluid velocity, which is part of the exchange.
 
 use crate::arrange::{Order, Places};
+use crate::auto::{Change, Watch};
 use crate::balance::{Books, ratio};
 use crate::forces::extra::{Each, Flow};
 use crate::forces::history::Memory;
 use crate::forces::{Around, DragLaw, Extra, Slip};
+use crate::inspect::measure::View;
 use crate::interpolate::{self, FluidVelocity};
 use crate::linearise::{Kept, LEVEL, Part, Predicted, Predictions, linearise};
 use crate::locate::{Locator, Lost};
@@ -270,6 +272,8 @@ pub struct CouplingStep {
     smoothed: Vec<Lanes>,
     /// continues the solids velocity into void cells, for schemes that want it so
     pinned: Option<Pinned>,
+    /// measures the terms and switches forces
+    watch: Option<Watch>,
     /// Voidage and sources of this step.
     pub sources: Sources,
     /// Reply to the DEM.
@@ -329,6 +333,7 @@ impl CouplingStep {
             mapped: Vec::new(),
             smoothed: Vec::new(),
             pinned: None,
+            watch: None,
             sources: Sources {
                 voidage: vec![1.0; n],
                 voidage_old: vec![1.0; n],
@@ -361,6 +366,43 @@ impl CouplingStep {
     /// The solids velocity of void cells is continued from the filled ones, which are held fixed.
     pub fn with_pinned(self, pinned: Option<Pinned>) -> Self {
         Self { pinned, ..self }
+    }
+
+    /// Forces are switched during the run (`auto`).
+    pub fn with_watch(self, watch: Option<Watch>) -> Self {
+        Self { watch, ..self }
+    }
+
+    /// The watch of this run.
+    pub fn watch(&mut self) -> Option<&mut Watch> {
+        self.watch.as_mut()
+    }
+
+    /// The forces in force, of those that may be switched (`Watch::in_force`); `None`: nothing is chosen.
+    pub fn in_force(&self) -> Option<u32> {
+        self.watch.as_ref().map(Watch::in_force)
+    }
+
+    /// Puts them in force for the coming exchange (restart, recording).
+    pub fn put_in_force(&mut self, bits: u32) {
+        if let Some(w) = &mut self.watch {
+            w.put(bits);
+            w.apply(&mut self.setup.extra);
+        }
+    }
+
+    /// Exchange k is over (after `after_fluid`): measures it if that is due, and switches forces for the next one.
+    pub fn reconsider(&mut self, k: i64, p: &Particles, fluid: &Fluid) -> Vec<Change> {
+        let Some(w) = &mut self.watch else { return Vec::new() };
+        let mut changes = Vec::new();
+        if w.due(k) {
+            let (mesh, hosts, sources, drive) = (&self.mesh, &self.hosts[..], &self.sources, &self.drive);
+            let view = View { mesh, particles: p, hosts, fluid, sources, drive, before: None };
+            changes = w.reconsider(k, &view);
+            w.apply(&mut self.setup.extra);
+        }
+        w.keep(k, p, &fluid.velocity);
+        changes
     }
 
     /// What the step carries from one exchange to the next: voidage, fluid velocity (m/s), and that of one step earlier
@@ -689,8 +731,11 @@ impl CouplingStep {
             }
         });
         self.predicted = out;
-        if self.setup.extra.forces() {
+        let x = &self.setup.extra;
+        if x.forces() || x.sends_added_mass() || x.sends_memory() {
             self.extra_forces(p);
+        } else {
+            self.extra.clear();
         }
     }
 
@@ -777,11 +822,16 @@ impl CouplingStep {
             kinematic_viscosity: s.kinematic_viscosity,
         };
         let (inside, d) = (self.order.inside, &mut self.drive);
-        let (added, memory) = (if s.extra.felderhof { p.len() } else { 0 }, p.asked.memory.len());
+        let added = if s.extra.sends_added_mass() { p.len() } else { 0 };
+        let memory = if s.extra.history { p.asked.memory.len() } else { p.len() };
         d.added_mass.clear();
         d.added_mass.resize(added, 0.0);
         d.memory.clear();
-        d.memory.resize(if s.extra.history { memory } else { 0 }, Memory::default());
+        d.memory.resize(if s.extra.sends_memory() { memory } else { 0 }, Memory::default());
+        if !s.extra.forces() {
+            // all zero: kept ready, and off
+            return;
+        }
         let coefficient = |i: usize| {
             let solid = if s.extra.felderhof { self.weights.gather(&self.work, i)[0] } else { 0.0 };
             s.extra.coefficient(solid, p.mass[i] / (p.volume(i) * s.density))
@@ -805,7 +855,8 @@ impl CouplingStep {
     /// Stage 9 (pass c): the new fluid smoothed by the same G, read at the particles; the impulse charged.
     pub fn after_fluid(&mut self, p: &Particles, fluid: &Fluid, first: bool) -> Result<(), StepError> {
         let begin = Instant::now();
-        if self.setup.extra.added() && !first {
+        let x = &self.setup.extra;
+        if (x.added() || x.added_mass_sent) && !first {
             self.fluid_before.clone_from(&self.fluid_velocity);
         }
         self.take_fluid(fluid)?;

@@ -102,12 +102,19 @@ fn terms(s: &mut Scene, c: &Config, drag: f64, weight: f64, phi: Option<f64>, hi
     let model_a = f.coupling.model == Model::A;
     put("drag", drag / scale, to, "drag law at the slip above", f.forces.drag != "none", None, None);
     let shear = length.map_or(0.0, |l| 2.0 * speed / l);
-    let wave = phi.map_or(0.0, |p| p * drag / scale).max(rho * speed * shear * sphere / scale);
+    // how many particles there are may not be known: a bed packed to 0.6 is the most
+    let carried = phi.unwrap_or(0.6) * drag / scale;
+    let mean = norm(f.fluid.mean_pressure_gradient) * sphere / scale;
+    let wave = carried.max(rho * speed * shear * sphere / scale).max(mean);
     put(
         "pressure gradient",
         wave,
         to,
-        "estimate: carries the drag of the solids, or rho U2/L",
+        if phi.is_some() {
+            "estimate: carries the drag of the solids, or rho U2/L"
+        } else {
+            "estimate: carries the drag of a bed packed to 0.6"
+        },
         model_a && f.forces.pressure_gradient,
         Some("coupling.model = \"A\", forces.pressure_gradient = true"),
         Some("coupling.model = \"B\", forces.pressure_gradient = false"),

@@ -64,6 +64,8 @@ struct Begin {
     time: f64,
     /// voidage, velocity and velocity before, in one array
     state: Option<(usize, Vec<u64>)>,
+    /// forces that `auto` had on
+    on: Option<u32>,
 }
 
 /// Feeds recorded messages to the transports.
@@ -91,12 +93,19 @@ impl<R: Read + Seek> Player<R> {
             return Ok(false);
         };
         if let Head::Exchange { k, time } = chunk.head {
-            let mut begin = Begin { k, time, state: None };
-            // what the step carries follows at once, if it is there
-            if let Some(next) = self.reader.next()? {
+            let mut begin = Begin { k, time, state: None, on: None };
+            // what is in force and what the step carries follow at once, if they are there
+            while let Some(next) = self.reader.next()? {
                 match next.head {
-                    Head::State { cells, .. } => begin.state = Some((cells as usize, next.words)),
-                    _ => self.take(next)?,
+                    Head::Choice { on, .. } => begin.on = Some(on),
+                    Head::State { cells, .. } => {
+                        begin.state = Some((cells as usize, next.words));
+                        break;
+                    }
+                    _ => {
+                        self.take(next)?;
+                        break;
+                    }
                 }
             }
             self.begin = Some(begin);
@@ -211,6 +220,7 @@ const FIXED: &[&str] = &[
     "dem.variables",
     "coupling.interval",
     "output.",
+    "auto.",
     "record.",
     "limits.wait",
 ];
@@ -320,7 +330,10 @@ pub fn replay<R: Read + Seek + 'static>(
     }
     let mesh = receive_mesh(&mut partners).map_err(|e| told(&e))?;
     let (slots, cells) = (mesh.slots.clone(), mesh.len());
-    let step = setup::step(&config, mesh).map_err(ReplayError::Run)?;
+    let mut step = setup::step(&config, mesh).map_err(ReplayError::Run)?;
+    if let Some(w) = step.watch() {
+        w.follow();
+    }
     let mut run = Exchange {
         partners,
         step,
@@ -342,7 +355,7 @@ pub fn replay<R: Read + Seek + 'static>(
     let mut before: Option<i64> = None;
     loop {
         let next = player.borrow_mut().next_exchange()?;
-        let Some(Begin { k, state, .. }) = next else { break };
+        let Some(Begin { k, state, on, .. }) = next else { break };
         if before.is_none() {
             missing(&config, &player.borrow().told)?;
         }
@@ -359,6 +372,9 @@ pub fn replay<R: Read + Seek + 'static>(
             }
             None if k == 0 || before == Some(k - 1) => {}
             None => return Err(carry("what the exchange before left is not in the recording").into()),
+        }
+        if let Some(bits) = on {
+            run.step.put_in_force(bits);
         }
         let result = run.exchange(k, &mut course);
         if let Err(e) = result {
