@@ -93,6 +93,7 @@ fn terms(s: &mut Scene, c: &Config, drag: f64, weight: f64, phi: Option<f64>, hi
     let to = if drag >= weight { "drag" } else { "weight" };
     let (length, slip, speed) = (s.length(), s.slip.mean, s.fluid_speed.max);
     let mass = s.density.mean * sphere;
+    let cell = (!s.cell_size.is_empty()).then_some(s.cell_size.mean);
     let tau = if s.relaxation.is_empty() { s.stokes_time() } else { s.relaxation.mean };
     // nothing accelerates a particle against the fluid faster than the larger of drag and weight
     let fastest = scale / mass;
@@ -190,11 +191,14 @@ fn terms(s: &mut Scene, c: &Config, drag: f64, weight: f64, phi: Option<f64>, hi
         Some("coupling.feedback = \"one-way\""),
     );
     let given = p * drag / sphere * length.unwrap_or(0.0) / (rho * (1.0 - p) * speed * speed);
+    // what one particle gives to its own cell of size h while it passes: K u/(rho h2 u2), of its slip
+    let own = cell.map_or(f64::INFINITY, |h| drag / (rho * h * h * slip * slip));
+    let given = given.max(own);
     put(
         "feedback on the fluid",
         if given.is_finite() { given } else { 1.0 },
         "rho U2/L",
-        "estimate: drag of the mean solids",
+        "estimate: drag of the mean solids, of one in its cell",
         two_way,
         Some("coupling.feedback = \"two-way\""),
         Some("coupling.feedback = \"one-way\""),
