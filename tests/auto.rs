@@ -289,6 +289,44 @@ fn forces_are_switched_during_a_run_alike_on_any_ranks_and_replayed_to_the_bit()
 }
 
 #[test]
+fn what_cannot_be_switched_is_told_once() {
+    let mut c =
+        case(&[("auto.accuracy", "1e-4"), ("coupling.model", "B"), ("coupling.feedback", "one-way")], 9);
+    (c.file.forces.pressure_gradient, c.file.forces.viscous_stress) = (false, false);
+    let s = Scratch::new("missing");
+    record(&s.0, &case(&[("record.first", "2")], 9), 9, [1, 1], Compression::Lz4);
+    let told = |c: &Config| {
+        let mut m = moments(&std::fs::read(&s.0).unwrap());
+        let x = m.at(1).unwrap().unwrap();
+        let mut p = x.particles().unwrap();
+        let mesh = &m.mesh;
+        let (fluid, sources, drive) =
+            (x.fluid(mesh).unwrap(), x.sources(mesh).unwrap(), x.drive(&p).unwrap());
+        let mut hosts = vec![NONE; p.len()];
+        Locator::new(mesh).locate(mesh, &mut p.position, &mut hosts).unwrap();
+        let (particles, hosts) = (&p, &hosts[..]);
+        let view =
+            View { mesh, particles, hosts, fluid: &fluid, sources: &sources, drive: &drive, before: None };
+        let mut watch = Watch::new(c).unwrap();
+        let once: Vec<String> = watch.reconsider(1, &view).iter().map(ToString::to_string).collect();
+        assert!(watch.reconsider(2, &view).is_empty(), "said once");
+        once
+    };
+    let lines = told(&c);
+    for (term, needed) in [
+        ("solid fraction at the particles", "coupling.model = \"A\""),
+        ("feedback on the fluid", "coupling.feedback = \"two-way\""),
+        ("history (Basset)", "forces.history = true"),
+    ] {
+        let line = lines.iter().find(|l| l.contains(&format!("missing: {term} is "))).expect(term);
+        assert!(line.contains(&format!("would need {needed} from the start")), "{line}");
+    }
+    // what the user has left out is not missed
+    c.file.auto.as_mut().unwrap().keep = auto::KEYS.map(String::from).to_vec();
+    assert_eq!(told(&c), Vec::<String>::new());
+}
+
+#[test]
 fn within_the_band_a_run_keeps_what_it_has() {
     let plain = run("band", &[("record.first", "2"), ("auto.every", "0")], &[], [1, 1]);
     let [_, _, history] = magnitudes(&plain, &case(&[], 9));

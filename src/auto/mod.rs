@@ -73,6 +73,15 @@ pub fn set(f: &mut Forces, key: &str, on: bool) {
     }
 }
 
+/// Puts in force what `bits` say (in the order of `SWITCHES`), for what may change.
+pub fn put(f: &mut CaseFile, bits: u32) {
+    for (n, s) in SWITCHES.iter().enumerate() {
+        if live(f, s.key) {
+            set(&mut f.forces, s.key, bits >> n & 1 == 1);
+        }
+    }
+}
+
 /// What to type for it.
 pub fn setting(key: &str, on: bool) -> String {
     let value = match (key, on) {

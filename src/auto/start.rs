@@ -236,7 +236,8 @@ impl Choosing<'_> {
         }
         set(&mut self.c.file.forces, s.key, wanted);
         // an estimate that is not known may turn out large
-        let reach = !(relative * s.reach <= self.auto.accuracy) && self.auto.every > 0;
+        let far = relative * s.reach <= self.auto.accuracy;
+        let reach = !far && self.auto.every > 0;
         if reach {
             self.live.push(s.key.into());
         }

@@ -79,11 +79,7 @@ impl Watch {
 
     /// Puts `bits` in force, for what may change.
     pub fn put(&mut self, bits: u32) {
-        for (n, s) in SWITCHES.iter().enumerate() {
-            if live(&self.config.file, s.key) {
-                set(&mut self.config.file.forces, s.key, bits >> n & 1 == 1);
-            }
-        }
+        super::put(&mut self.config.file, bits);
     }
 
     /// Makes a step compute what is in force.
@@ -108,7 +104,8 @@ impl Watch {
 
     /// Measures exchange k, and switches from the next one on; `view` without the exchange before.
     pub fn reconsider(&mut self, k: i64, view: &View) -> Vec<Change> {
-        let scene = self.measure(k, view);
+        let mut scene = self.measure(k, view);
+        scene.terms.push(solids(&scene, &self.config.file));
         let mut list = Vec::new();
         for t in &scene.terms {
             let switch = SWITCHES.iter().find(|s| s.term == t.name);
@@ -144,7 +141,8 @@ impl Watch {
     fn missing(&mut self, t: &Term, switch: Option<&Switch>) -> Option<Change> {
         let (key, setting) = needed(&self.config.file, t.name, switch)?;
         let kept = self.config.file.auto.as_ref().is_some_and(|a| a.keep.iter().any(|k| k == key));
-        if t.now || kept || !(t.relative > self.accuracy) || self.told.contains(&t.name) {
+        let large = t.relative > self.accuracy;
+        if t.now || kept || !large || self.told.contains(&t.name) {
             return None;
         }
         self.told.push(t.name);
@@ -152,10 +150,18 @@ impl Watch {
     }
 }
 
+/// In model B no pressure gradient is sent that could be measured: the share of it that the solids carry is their fraction.
+const SOLIDS: &str = "solid fraction at the particles";
+
+fn solids(s: &Scene, f: &CaseFile) -> Term {
+    let (relative, now) = (s.solid_fraction_seen.mean, f.coupling.model == Model::A);
+    Term { name: SOLIDS, relative, to: "1", how: "mean", now, on: None, off: None }
+}
+
 /// Key and setting that would bring a term which cannot be switched during a run.
 fn needed(f: &CaseFile, term: &str, switch: Option<&Switch>) -> Option<(&'static str, String)> {
     match term {
-        "pressure gradient" | "viscous stress" if f.coupling.model == Model::B => {
+        "pressure gradient" | "viscous stress" | SOLIDS if f.coupling.model == Model::B => {
             Some((MODEL, format!("{MODEL} = \"A\"")))
         }
         "feedback on the fluid" | "voidage rate in continuity" if f.coupling.feedback == Feedback::OneWay => {

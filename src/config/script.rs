@@ -15,8 +15,10 @@ pub struct Script {
     pub domain: Option<([f64; 3], [f64; 3])>,
     /// "p" or others, per axis
     pub boundary: Option<[String; 3]>,
-    /// particles of the data file, of `create_atoms … single` and of `insert/pack … insert_every once … particles_in_region`
+    /// particles of the data file
     pub count: Option<f64>,
+    /// particles of `create_atoms … single` and of `insert/pack … insert_every once … particles_in_region`
+    pub placed: Option<f64>,
     /// file of `read_data`
     pub data: Option<std::path::PathBuf>,
     pub has_fix: bool,
@@ -62,11 +64,11 @@ pub fn read(path: &Path, given: &BTreeMap<String, String>) -> Result<Script, Str
             }
             Some("read_restart") => s.has_restart = true,
             Some("create_atoms") if w.get(2) == Some(&"single") => {
-                s.count = Some(s.count.unwrap_or(0.0) + 1.0);
+                s.placed = Some(s.placed.unwrap_or(0.0) + 1.0);
             }
             Some("fix") if w.get(3) == Some(&"insert/pack") && line.contains("insert_every once") => {
                 let at = w.iter().position(|x| *x == "particles_in_region");
-                s.count = at.and_then(|i| n(i + 1)).map(|more| more + s.count.unwrap_or(0.0)).or(s.count);
+                s.placed = at.and_then(|i| n(i + 1)).map(|more| more + s.placed.unwrap_or(0.0)).or(s.placed);
             }
             Some("fix") if w.get(3) == Some(&"voidage") => s.has_fix = true,
             Some("fix") if w.get(3) == Some(&"particletemplate/sphere") => {

@@ -43,7 +43,8 @@ pub const OFF_BELOW: f64 = 1.0 / 3.0;
 
 /// Is a term on, of this magnitude now and on or off before? What cannot be told stays.
 pub fn hysteresis(on: bool, relative: f64, accuracy: f64) -> bool {
-    if on { !(relative < OFF_BELOW * accuracy) } else { relative > accuracy }
+    let small = relative < OFF_BELOW * accuracy;
+    if on { !small } else { relative > accuracy }
 }
 
 /// Share of a cell's solids that the smoothing moves out of it; `bandwidth` and `cell` (size) in m.

@@ -14,6 +14,7 @@ use std::f64::consts::PI;
 pub fn scene(c: &Config) -> Result<Scene, String> {
     let f = &c.file;
     let s = script::read(&c.script(), &f.dem.variables)?;
+    let count = s.count.or(s.placed);
     let need = |what: &str| {
         format!(
             "{} does not tell the {what} of the particles (set … diameter … density with plain numbers): record an exchange \
@@ -30,7 +31,7 @@ pub fn scene(c: &Config) -> Result<Scene, String> {
     let volume = extent.as_ref().map(|e| side(e).iter().product::<f64>());
     let sphere = PI / 6.0 * d.powi(3);
     let cells = extent.as_ref().and_then(|e| e.cells);
-    let phi = s.count.zip(volume).map(|(n, v)| (n * sphere / v).min(0.9));
+    let phi = count.zip(volume).map(|(n, v)| (n * sphere / v).min(0.9));
     let law = forces::by_name(&f.forces.drag).ok_or("forces.drag")?;
     let mean = phi.unwrap_or(0.0);
     let ratio = f.dem.coarse_graining.of_all();
@@ -52,7 +53,7 @@ pub fn scene(c: &Config) -> Result<Scene, String> {
     let drag = k(slip, 1.0 - mean) * slip;
     let mut scene = Scene {
         from: "the files of the case (estimates)".into(),
-        particles: s.count.map(Range::one).unwrap_or_default(),
+        particles: count.map(Range::one).unwrap_or_default(),
         cells,
         bounds: extent.as_ref().map(|e| [e.lower, e.upper]),
         diameter: Range::one(d),

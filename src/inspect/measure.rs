@@ -8,7 +8,7 @@
 
 use super::{Scene, Term};
 use crate::config::{Config, Continuity, Feedback, GravityTreatment, Model};
-use crate::forces::{self, DragLaw, lift, parcel::ParticleStress};
+use crate::forces::{self, DragLaw, history::History, lift, parcel::ParticleStress};
 use crate::interpolate::gradient;
 use crate::mesh::{Mesh, NONE};
 use crate::particles::Particles;
@@ -73,6 +73,8 @@ pub struct Sums {
     viscous: Rms,
     added: Rms,
     history: Rms,
+    /// the history force as computed, where it is on and the particles bring its memory
+    remembered: Rms,
     /// Σ of what a lasting mean acceleration would give, and its number
     lasting: (V, f64),
     lift: Rms,
@@ -172,6 +174,11 @@ impl Sums {
             self.history.add(basset * s.period.sqrt() * norm(relative));
             (0..3).for_each(|a| self.lasting.0[a] += basset * remembered.sqrt() * relative[a]);
             self.lasting.1 += 1.0;
+            if let Some(memory) = p.asked.memory.get(i).filter(|_| f.forces.history) {
+                let slip = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
+                let integral = History::from(memory).advance(slip, s.period);
+                self.remembered.add(0.5 * basset * norm(integral));
+            }
             let vorticity = [grad[2][1] - grad[1][2], grad[0][2] - grad[2][0], grad[1][0] - grad[0][1]];
             let shear =
                 lift::Shear { diameter: primary, slip, vorticity, kinematic_viscosity: nu, density: rho };
@@ -261,12 +268,18 @@ impl Sums {
             Some("forces.added_mass = 0"),
         );
         let lasting = norm(x.lasting.0) / x.lasting.1.max(1.0);
-        let history = x.history.value().hypot(lasting) / scale;
+        // the tail of the past fades slowly, long after the acceleration: where the force is there, it tells
+        let (estimate, real) = (x.history.value().hypot(lasting), x.remembered.value());
+        let history = estimate.max(real) / scale;
         put(
             "history (Basset)",
             history,
             to,
-            "mean acceleration lasting m/K, rest one step",
+            if real > estimate {
+                "force as computed"
+            } else {
+                "mean acceleration lasting m/K, rest one step"
+            },
             f.forces.history,
             Some("forces.history = true"),
             Some("forces.history = false"),

@@ -6,6 +6,7 @@
 
 use super::Scene;
 use super::measure::{Before, Sums, View};
+use crate::auto;
 use crate::config::Config;
 use crate::forces;
 use crate::locate::Locator;
@@ -43,6 +44,7 @@ pub fn scene<R: Read + Seek>(m: &mut Moments<R>, c: &Config) -> Result<Scene, Re
     let law = forces::by_name(&c.file.forces.drag);
     let mut s = unmeasured(&m.mesh, c);
     let locator = Locator::new(&m.mesh);
+    let mut in_force = None;
     let (mut x, mut samples) = (Sums::default(), 0);
     let n = m.exchanges.len();
     let mut chosen: Vec<usize> = (0..SAMPLES.min(n)).map(|i| (i + 1) * n / SAMPLES.min(n) - 1).collect();
@@ -60,6 +62,7 @@ pub fn scene<R: Read + Seek>(m: &mut Moments<R>, c: &Config) -> Result<Scene, Re
         let Some(now) = m.at(at)? else { continue };
         list.push(k);
         samples += 1;
+        in_force = now.on;
         one(&mut s, &mut x, m, &now, earlier.as_ref(), c, law, &locator)?;
     }
     if samples == 0 {
@@ -68,7 +71,12 @@ pub fn scene<R: Read + Seek>(m: &mut Moments<R>, c: &Config) -> Result<Scene, Re
     s.from = format!("exchanges {list:?} of {n} recorded");
     s.solid_fraction = Some(x.solid_fraction(&m.mesh));
     s.fluid_relaxation = x.fluid_relaxation(c.file.fluid.density);
-    x.terms(&mut s, c);
+    // what `auto` had on in the last of them
+    let mut c = c.clone();
+    if let Some(bits) = in_force {
+        auto::put(&mut c.file, bits);
+    }
+    x.terms(&mut s, &c);
     Ok(s)
 }
 

@@ -97,7 +97,8 @@ impl<R: Read + Seek> Player<R> {
             // what is in force and what the step carries follow at once, if they are there
             while let Some(next) = self.reader.next()? {
                 match next.head {
-                    Head::Choice { on, .. } => begin.on = Some(on),
+                    // of another exchange: damage that the replies show
+                    Head::Choice { k: of, on } => begin.on = Some(on).filter(|_| of == k),
                     Head::State { cells, .. } => {
                         begin.state = Some((cells as usize, next.words));
                         break;
