@@ -97,6 +97,7 @@ fn deep(list: &mut Vec<Chunk>, r: &mut Random) {
                         _ => s.origin = f64::from_bits(r.word()),
                     },
                     Head::Row(row) => row.time = f64::from_bits(r.word()),
+                    Head::Choice { k: at, on } => (*at, *on) = (k, r.word() as u32),
                     Head::Index => {}
                 }
             }

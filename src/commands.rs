@@ -9,6 +9,7 @@ pub mod report;
 pub mod stability;
 pub mod tune;
 
+use crate::auto;
 use crate::config::{self, CaseFile, Config, Problem, Severity};
 use crate::couple::{Exchange, receive_mesh};
 use crate::launch::{self, Outcome};
@@ -50,8 +51,11 @@ fn print(problems: &[Problem]) {
     }
 }
 
-fn read(case: &Path, set: &[String]) -> Result<Config, u8> {
-    overrides(set).and_then(|o| config::load(case, &o)).map_err(|p| {
+/// The case as it will run, and what `auto` has chosen.
+fn read(case: &Path, set: &[String]) -> Result<(Config, Option<auto::Plan>), u8> {
+    let config = overrides(set).and_then(|o| config::load(case, &o));
+    let chosen = config.and_then(|mut c| auto::resolve(&mut c).map(|plan| (c, plan)));
+    chosen.map_err(|p| {
         print(&p);
         BAD_INPUT
     })
@@ -59,12 +63,13 @@ fn read(case: &Path, set: &[String]) -> Result<Config, u8> {
 
 /// `voidage check CASE`
 pub fn check(case: &Path, set: &[String]) -> u8 {
-    let config = match read(case, set) {
+    let (config, plan) = match read(case, set) {
         Ok(c) => c,
         Err(code) => return code,
     };
     let problems = config::check(&config);
     print(&problems);
+    plan.iter().for_each(|p| print!("{p}"));
     record::forecast(&config);
     let count = |s: Severity| problems.iter().filter(|p| p.severity == s).count();
     let errors = count(Severity::Error);
@@ -80,7 +85,7 @@ pub fn run(case: &Path, into: Option<&Path>, set: &[String], restart: Option<Opt
         return BAD_INPUT;
     }
     // problems of the original are told before anything is copied
-    let mut config = match read(case, set) {
+    let (mut config, plan) = match read(case, set) {
         Ok(c) => c,
         Err(code) => return code,
     };
@@ -109,11 +114,12 @@ pub fn run(case: &Path, into: Option<&Path>, set: &[String], restart: Option<Opt
                 return BAD_INPUT;
             }
             match read(folder, set) {
-                Ok(c) => c,
+                Ok((c, _)) => c,
                 Err(code) => return code,
             }
         }
     };
+    plan.iter().for_each(|p| print!("{p}"));
     if let Err(p) = record::before(&config, restart.as_ref().map(|r| r.state.time)) {
         print(&[p]);
         return BAD_INPUT;
@@ -170,6 +176,8 @@ fn coupled(case: &Path, resolved: bool, restart: Option<&Path>) -> Result<(), St
         let text =
             std::fs::read_to_string(case.join("logs/case.resolved.toml")).map_err(|e| e.to_string())?;
         config.file = toml::from_str::<CaseFile>(&text).map_err(|e| e.to_string())?;
+    } else {
+        auto::resolve(&mut config).map_err(|p| p.iter().map(|p| format!("{p}\n")).collect::<String>())?;
     }
     let resume = restart.map(State::read).transpose()?;
     if let Some(s) = &resume {

@@ -251,6 +251,9 @@ impl<T: Transport> Exchange<'_, T> {
             let snapshot = Snapshot { k, time, particles: &particles, step: &self.step, fluid };
             (self.write)(&snapshot).map_err(|source| CoupleError::File { what: "write fields", source })?;
         }
+        for change in self.step.reconsider(k, &particles, &course.fluid) {
+            tracing::info!("auto, exchange {k} (t = {time} s): {change}");
+        }
         let mut o = self.open_row(k, time, &particles, &mut course.summary);
         o.row.wait_dem = wait_dem.as_secs_f64();
         o.row.wait_cfd = wait_cfd.as_secs_f64();
@@ -314,6 +317,7 @@ impl<T: Transport> Exchange<'_, T> {
             voidage: self.step.sources.voidage.clone(),
             velocity: fluid.velocity.clone(),
             velocity_before: self.step.carried().2.to_vec(),
+            in_force: self.step.in_force(),
             ..State::default()
         }
     }
@@ -353,6 +357,12 @@ impl<T: Transport> Exchange<'_, T> {
             )));
         }
         self.step.restore(&s.voidage, &s.velocity, &s.velocity_before);
+        if let Some(bits) = s.in_force {
+            self.step.put_in_force(bits);
+        }
+        if let Some(w) = self.step.watch() {
+            w.keep(k, &p, &s.velocity);
+        }
         self.send_sources(k, s.time)?;
         Ok(Open { row: s.row, books: s.books })
     }
@@ -464,9 +474,9 @@ impl<T: Transport> Exchange<'_, T> {
             ];
             // those behind the first four only if they are asked for, from no particles too
             let asked = |name: u32| match name {
-                field::ADDED_MASS => self.step.extra().felderhof,
+                field::ADDED_MASS => self.step.extra().sends_added_mass(),
                 field::ROTATION_COEFFICIENT | field::ROTATION_RATE => self.step.extra().torque,
-                field::MEMORY => self.step.extra().history,
+                field::MEMORY => self.step.extra().sends_memory(),
                 _ => true,
             };
             let mut blocks: Vec<_> =

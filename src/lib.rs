@@ -28,6 +28,7 @@ pub mod linearise;
 
 pub mod step;
 
+pub mod auto;
 pub mod balance;
 pub mod bench;
 pub mod commands;

@@ -203,6 +203,7 @@ fn main() -> ExitCode {
             let (into, tune, stability) = (into.as_deref(), tune.as_deref(), stability.as_deref());
             let options = commands::report::Options { into, accuracy, tune, stability };
             commands::report::report(&file, &options)
+        }
         Command::Tune { file, accuracy, set, exchanges, only, write, json, all } => {
             let (write, json) = (write.as_deref(), json.as_deref());
             let o = commands::tune::Options { set: &set, accuracy, exchanges, only: &only, write, json, all };

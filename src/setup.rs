@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! From a case to the objects of a run: methods by name, settings for the partners, agreement of the programs.
 
+use crate::auto::{self, Watch};
 use crate::config::{Config, Feedback, Flow, GravityTreatment, InInterval, Model};
 use crate::interpolate::FluidVelocity;
 use crate::map::Mapping;
@@ -11,6 +12,29 @@ use crate::smooth::{self, Classes, Diffusion, Pinned, Smoother};
 use crate::step::{CouplingStep, Setup};
 use crate::{forces, map, scheme};
 use voidage_wire::{Transport, Welcome};
+
+/// The forces beside drag.
+pub fn extra(c: &Config) -> forces::Extra {
+    let (f, x) = (&c.file, &c.file.forces);
+    let stress = forces::parcel::ParticleStress {
+        pressure: x.particle_stress,
+        exponent: x.particle_stress_exponent,
+        close_packing: x.close_packing,
+        floor: 1e-7,
+    };
+    forces::Extra {
+        ratio: f.dem.coarse_graining.of_all(),
+        ratio_by_type: f.dem.coarse_graining.by_type(),
+        lift: forces::lift::all().iter().copied().find(|l| l.name() == x.lift),
+        added_mass: x.added_mass.coefficient(),
+        felderhof: x.added_mass.law(),
+        history: x.history,
+        torque: x.torque,
+        stress: (x.particle_stress > 0.0).then_some(stress),
+        added_mass_sent: auto::live(f, auto::ADDED_MASS),
+        memory_sent: auto::live(f, auto::HISTORY),
+    }
+}
 
 /// The step's settings.
 pub fn setup(c: &Config) -> Result<Setup, String> {
@@ -28,12 +52,6 @@ pub fn setup(c: &Config) -> Result<Setup, String> {
         kinematic_viscosity: f.fluid.kinematic_viscosity,
         parcel_factor: 0.05,
         ratio: f.dem.coarse_graining.of_all(),
-    };
-    let stress = forces::parcel::ParticleStress {
-        pressure: x.particle_stress,
-        exponent: x.particle_stress_exponent,
-        close_packing: x.close_packing,
-        floor: 1e-7,
     };
     Ok(Setup {
         drag: forces::build(&f.forces.drag, &options)
@@ -54,16 +72,7 @@ pub fn setup(c: &Config) -> Result<Setup, String> {
         period: c.period(),
         voidage_min: f.limits.voidage_min,
         exclude_outside: f.limits.outside == "exclude",
-        extra: forces::Extra {
-            ratio: f.dem.coarse_graining.of_all(),
-            ratio_by_type: f.dem.coarse_graining.by_type(),
-            lift: forces::lift::all().iter().copied().find(|l| l.name() == x.lift),
-            added_mass: x.added_mass.coefficient(),
-            felderhof: x.added_mass.law(),
-            history: x.history,
-            torque: x.torque,
-            stress: (x.particle_stress > 0.0).then_some(stress),
-        },
+        extra: extra(c),
         average: smooth::TimeAverage::new(c.period(), f.smooth.time),
     })
 }
@@ -115,7 +124,7 @@ pub fn step(c: &Config, mesh: Mesh) -> Result<CouplingStep, String> {
     let mapping = mapping(c, &mesh)?;
     let (classes, pinned) = (classes(c, &mesh), pinned(c, &mesh));
     let step = CouplingStep::new(mesh, setup(c)?, mapping, smoother, positive);
-    Ok(step.with_classes(classes).with_pinned(pinned))
+    Ok(step.with_classes(classes).with_pinned(pinned).with_watch(Watch::new(c)))
 }
 
 /// What the partners are told (names in `docs/wire.md`).
@@ -123,6 +132,7 @@ pub fn welcome(c: &Config, resume: Option<&State>) -> Welcome {
     let f = &c.file;
     let yes = f64::from;
     let mut w = Welcome::default();
+    let extra = extra(c);
     let mut set = |k: &str, v: f64| w.settings.insert(k.into(), v);
     set("dem.time_step", f.dem.time_step);
     set("dem.explicit_limit", 0.2);
@@ -148,9 +158,9 @@ pub fn welcome(c: &Config, resume: Option<&State>) -> Welcome {
     set("send.history", yes(scheme::by_name(&f.coupling.scheme).is_some_and(|s| s.wants_history())));
     set("send.type", yes(!f.dem.coarse_graining.by_type().is_empty()));
     set("send.angular_velocity", yes(f.forces.torque));
-    set("drive.added_mass", yes(f.forces.added_mass.law()));
+    set("drive.added_mass", yes(extra.sends_added_mass()));
     set("drive.rotation", yes(f.forces.torque));
-    set("drive.memory", if f.forces.history { forces::history::Memory::WIDTH as f64 } else { 0.0 });
+    set("drive.memory", if extra.sends_memory() { forces::history::Memory::WIDTH as f64 } else { 0.0 });
     set("send.pressure_gradient", yes(model_a && f.forces.pressure_gradient));
     set("send.stress_divergence", yes(model_a && f.forces.viscous_stress));
     w

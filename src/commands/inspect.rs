@@ -21,7 +21,7 @@ pub fn inspect(path: &Path, set: &[String], accuracy: f64) -> u8 {
 
 fn of_case(path: &Path, set: &[String], accuracy: f64) -> u8 {
     let config = match read(path, set) {
-        Ok(c) => c,
+        Ok((c, _)) => c,
         Err(code) => return code,
     };
     match expected::scene(&config) {

@@ -129,7 +129,7 @@ struct Found {
 }
 
 fn of_case(path: &Path) -> Result<Found, u8> {
-    let config = read(path, &[])?;
+    let (config, _) = read(path, &[])?;
     let file = path.join("monitor.csv");
     let rows = monitor::read(&file).map_err(|e| {
         let fix = format!("voidage run {}", path.display());

@@ -113,6 +113,9 @@ fn values(c: &Config, p: &mut Vec<Problem>) {
         range("smooth.largest_cell", f.smooth.largest_cell, 1e-9, 1e4, "m");
     }
     range("smooth.time", f.smooth.time, 0.0, 1e6, "s");
+    if let Some(a) = &f.auto {
+        range("auto.accuracy", a.accuracy, 1e-9, 0.5, "");
+    }
     let counts = [
         ("run.dem_ranks", f.run.dem_ranks),
         ("run.cfd_ranks", f.run.cfd_ranks),

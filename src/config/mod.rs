@@ -13,9 +13,10 @@ mod resolution;
 pub mod script;
 
 pub use check::{check, settings};
-use raw::parse;
 pub use raw::*;
+use raw::{Parsed, parse};
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -93,6 +94,8 @@ pub struct Config {
     pub file: CaseFile,
     /// what system/controlDict says
     pub control: foam::Control,
+    /// keys the user has set: in case.toml and by overrides; of a recording, by overrides alone
+    pub given: BTreeSet<String>,
 }
 
 impl Config {
@@ -121,7 +124,7 @@ pub fn load(folder: &Path, overrides: &[(String, String)]) -> Result<Config, Vec
     let text = std::fs::read_to_string(&file).map_err(|e| {
         vec![Problem::error(&name, e, "a case is a folder with a case.toml", "voidage run FOLDER")]
     })?;
-    let (file, wake) = parse(&text, overrides).map_err(|mut p| {
+    let Parsed { file, wake, given } = parse(&text, overrides).map_err(|mut p| {
         p.iter_mut().filter(|p| p.place.is_empty()).for_each(|p| p.place.clone_from(&name));
         p
     })?;
@@ -131,7 +134,7 @@ pub fn load(folder: &Path, overrides: &[(String, String)]) -> Result<Config, Vec
         let fix = "set fluid.case to the OpenFOAM case (folder with system/controlDict)";
         vec![Problem::error("fluid.case", file.fluid.case.display(), &e, fix)]
     })?;
-    let mut config = Config { folder, file, control };
+    let mut config = Config { folder, file, control, given };
     if wake {
         config.file.smooth.bandwidth = bandwidth::from_wake(&config).map_err(|p| vec![p])?;
     }
@@ -144,10 +147,15 @@ pub fn recorded(
     overrides: &[(String, String)],
     control: foam::Control,
 ) -> Result<Config, Vec<Problem>> {
-    let (file, wake) = parse(text, overrides)?;
+    let Parsed { mut file, wake, .. } = parse(text, overrides)?;
+    let given: BTreeSet<String> = overrides.iter().map(|o| o.0.clone()).collect();
+    if let Some(auto) = &mut file.auto {
+        // what is set for the replay stays so
+        auto.live.retain(|key| !given.contains(key));
+    }
     if wake {
         let fix = "smooth.bandwidth = 0.0048";
         return Err(vec![Problem::error("smooth.bandwidth", "wake", "a number in m for a recording", fix)]);
     }
-    Ok(Config { folder: PathBuf::new(), file, control })
+    Ok(Config { folder: PathBuf::new(), file, control, given })
 }

@@ -5,7 +5,7 @@ use super::Problem;
 use crate::interpolate::FluidVelocity;
 use crate::{forces, map, scheme, smooth};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 /// The whole file.
@@ -31,6 +31,8 @@ pub struct CaseFile {
     pub limits: Limits,
     #[serde(default)]
     pub record: Record,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub auto: Option<Auto>,
 }
 
 /// Section `run`.
@@ -413,6 +415,24 @@ impl Default for Record {
     }
 }
 
+/// Section `auto`: without it nothing is chosen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+#[allow(missing_docs)]
+pub struct Auto {
+    pub accuracy: f64,
+    pub every: u32,
+    pub keep: Vec<String>,
+    /// written by `voidage run` into the resolved case: the keys that may change during the run
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub live: Vec<String>,
+}
+impl Default for Auto {
+    fn default() -> Self {
+        Self { accuracy: 1e-2, every: 500, keep: Vec::new(), live: Vec::new() }
+    }
+}
+
 /// Reference of all keys: key, unit, default ("-" = must be given), meaning.
 pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("format", "", "-", "version of this file, 1"),
@@ -554,6 +574,31 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ("record.last", "", "0", "record the last n exchanges before endTime as well"),
     ("record.file", "", "recording.voidage", "the file, below the case folder; never overwritten"),
     ("record.compression", "", "none", "none | lz4: a third smaller, for 4 ms of CPU per 2.6 MB"),
+    (
+        "auto.accuracy",
+        "",
+        "1e-2",
+        "choose the models: a term is on where its magnitude, relative to weight or drag, exceeds this (docs/auto.md)",
+    ),
+    (
+        "auto.every",
+        "exchanges",
+        "500",
+        "measure the terms again after so many exchanges, and switch; 0: never",
+    ),
+    (
+        "auto.keep",
+        "",
+        "[]",
+        "keys not to touch beside those set in the case; auto chooses coupling.model, coupling.feedback, smooth.method, \
+         forces.lift, forces.added_mass, forces.history",
+    ),
+    (
+        "auto.live",
+        "",
+        "[]",
+        "written by voidage run into logs/case.resolved.toml: keys it may change during the run",
+    ),
     ("limits.wait", "s", "60", "longest wait for a peer"),
     ("limits.outside", "", "error", "error | exclude: particles outside the mesh"),
     ("limits.voidage_min", "", "0", "cap the voidage from below (counted); 0: stop the run instead"),
@@ -580,9 +625,17 @@ pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) 
     (best.0 <= name.len() / 2 + 1).then_some(best.1)
 }
 
-/// Parses and applies overrides; true: the bandwidth is to be taken from the wake. Problems without a place are about
-/// the file itself.
-pub(super) fn parse(text: &str, overrides: &[(String, String)]) -> Result<(CaseFile, bool), Vec<Problem>> {
+/// A case file as read.
+pub(super) struct Parsed {
+    pub file: CaseFile,
+    /// the bandwidth is to be taken from the wake
+    pub wake: bool,
+    /// keys in the text and the overrides
+    pub given: BTreeSet<String>,
+}
+
+/// Parses and applies overrides. Problems without a place are about the file itself.
+pub(super) fn parse(text: &str, overrides: &[(String, String)]) -> Result<Parsed, Vec<Problem>> {
     let syntax = |e: toml::de::Error| {
         let line = e.span().map(|s| text[..s.start.min(text.len())].lines().count().max(1));
         let given = line.map(|l| format!("line {l}")).unwrap_or_default();
@@ -596,12 +649,13 @@ pub(super) fn parse(text: &str, overrides: &[(String, String)]) -> Result<(CaseF
     if !unknown.is_empty() {
         return Err(unknown);
     }
+    let given = table.iter().flat_map(|(section, v)| keys(section, v)).collect();
     let wake = bandwidth_word(&mut table)?;
     let file = CaseFile::deserialize(table).map_err(|e| {
         vec![Problem::error("", "its content", &e.message().replace('\n', " "), "see `voidage explain`")]
     })?;
     let problems = names(&file);
-    if problems.is_empty() { Ok((file, wake)) } else { Err(problems) }
+    if problems.is_empty() { Ok(Parsed { file, wake, given }) } else { Err(problems) }
 }
 
 /// A word in the place of the bandwidth: "wake", to be replaced by a number later.
@@ -637,15 +691,19 @@ fn set(table: &mut toml::Table, key: &str, value: &str) -> Result<(), Vec<Proble
     Ok(())
 }
 
+/// Keys of a section; a value outside sections is its own key.
+fn keys(section: &str, value: &toml::Value) -> Vec<String> {
+    match value {
+        toml::Value::Table(t) => t.keys().map(|k| format!("{section}.{k}")).collect(),
+        _ => vec![section.to_string()],
+    }
+}
+
 fn unknown_keys(table: &toml::Table) -> Vec<Problem> {
     let mut problems = Vec::new();
     let known = || KEYS.iter().map(|k| k.0);
     for (section, value) in table {
-        let keys: Vec<String> = match value {
-            toml::Value::Table(t) => t.keys().map(|k| format!("{section}.{k}")).collect(),
-            _ => vec![section.clone()],
-        };
-        for key in keys.into_iter().filter(|k| !known().any(|n| n == k)) {
+        for key in keys(section, value).into_iter().filter(|k| !known().any(|n| n == k)) {
             let fix = match nearest(&key, known()) {
                 Some(n) => format!("did you mean {n}?"),
                 None => "see `voidage explain`".into(),
@@ -679,6 +737,9 @@ fn names(file: &CaseFile) -> Vec<Problem> {
     check("limits.outside", &file.limits.outside, vec!["error", "exclude"]);
     check("output.picture", &file.output.picture, vec!["none", "x", "y", "z"]);
     check("dem.program", &file.dem.program, vec!["liggghts"]);
+    for key in file.auto.iter().flat_map(|a| &a.keep) {
+        check("auto.keep", key, crate::auto::KEYS.to_vec());
+    }
     if let AddedMass::Law(law) = &file.forces.added_mass {
         check("forces.added_mass", law, vec!["felderhof"]);
     }

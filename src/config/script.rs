@@ -17,6 +17,8 @@ pub struct Script {
     pub boundary: Option<[String; 3]>,
     /// particles of the data file
     pub count: Option<f64>,
+    /// particles of `create_atoms … single` and of `insert/pack … insert_every once … particles_in_region`
+    pub placed: Option<f64>,
     /// file of `read_data`
     pub data: Option<std::path::PathBuf>,
     pub has_fix: bool,
@@ -61,6 +63,13 @@ pub fn read(path: &Path, given: &BTreeMap<String, String>) -> Result<Script, Str
                 s.data = file;
             }
             Some("read_restart") => s.has_restart = true,
+            Some("create_atoms") if w.get(2) == Some(&"single") => {
+                s.placed = Some(s.placed.unwrap_or(0.0) + 1.0);
+            }
+            Some("fix") if w.get(3) == Some(&"insert/pack") && line.contains("insert_every once") => {
+                let at = w.iter().position(|x| *x == "particles_in_region");
+                s.placed = at.and_then(|i| n(i + 1)).map(|more| more + s.placed.unwrap_or(0.0)).or(s.placed);
+            }
             Some("fix") if w.get(3) == Some(&"voidage") => s.has_fix = true,
             Some("fix") if w.get(3) == Some(&"particletemplate/sphere") => {
                 let constant = |key: &str| {

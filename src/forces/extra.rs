@@ -31,6 +31,10 @@ pub struct Extra {
     pub torque: bool,
     /// MP-PIC stress
     pub stress: Option<ParticleStress>,
+    /// each particle is told its added mass, be there any or not: it may be switched on during the run
+    pub added_mass_sent: bool,
+    /// the memory of the history force travels, be it on or not
+    pub memory_sent: bool,
 }
 
 impl Default for Extra {
@@ -44,6 +48,8 @@ impl Default for Extra {
             history: false,
             torque: false,
             stress: None,
+            added_mass_sent: false,
+            memory_sent: false,
         }
     }
 }
@@ -90,6 +96,14 @@ impl Extra {
     /// Is there an added mass?
     pub fn added(&self) -> bool {
         self.added_mass > 0.0 || self.felderhof
+    }
+    /// The particle program gets the added mass of each particle.
+    pub fn sends_added_mass(&self) -> bool {
+        self.felderhof || self.added_mass_sent
+    }
+    /// The particle program keeps the memory of the history force.
+    pub fn sends_memory(&self) -> bool {
+        self.history || self.memory_sent
     }
     /// Coarse-graining ratio of particle i; `kind`: types of all particles.
     #[inline]

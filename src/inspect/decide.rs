@@ -37,12 +37,27 @@ pub fn choose(t: &Term, accuracy: f64) -> Choice {
     }
 }
 
+/// Share of the accuracy below which a term that is on is switched off: between the two nothing changes, so that a magnitude
+/// about the accuracy does not switch to and fro.
+pub const OFF_BELOW: f64 = 1.0 / 3.0;
+
+/// Is a term on, of this magnitude now and on or off before? What cannot be told stays.
+pub fn hysteresis(on: bool, relative: f64, accuracy: f64) -> bool {
+    let small = relative < OFF_BELOW * accuracy;
+    if on { !small } else { relative > accuracy }
+}
+
+/// Share of a cell's solids that the smoothing moves out of it; `bandwidth` and `cell` (size) in m.
+pub fn smoothed_share(bandwidth: f64, cell: f64) -> f64 {
+    (1.5 * (bandwidth / cell).powi(2)).min(1.0)
+}
+
 /// Adds the smoothing itself: the share of a cell's solids that leaves it, 6 T/h² with T = b²/4.
 pub fn smoothing(s: &mut Scene, now: bool) {
     if s.cell_size.is_empty() || s.bandwidth <= 0.0 {
         return;
     }
-    let relative = (1.5 * (s.bandwidth / s.cell_size.mean).powi(2)).min(1.0);
+    let relative = smoothed_share(s.bandwidth, s.cell_size.mean);
     s.terms.push(Term {
         name: "smoothing",
         relative,

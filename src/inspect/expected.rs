@@ -14,6 +14,7 @@ use std::f64::consts::PI;
 pub fn scene(c: &Config) -> Result<Scene, String> {
     let f = &c.file;
     let s = script::read(&c.script(), &f.dem.variables)?;
+    let count = s.count.or(s.placed);
     let need = |what: &str| {
         format!(
             "{} does not tell the {what} of the particles (set … diameter … density with plain numbers): record an exchange \
@@ -30,7 +31,7 @@ pub fn scene(c: &Config) -> Result<Scene, String> {
     let volume = extent.as_ref().map(|e| side(e).iter().product::<f64>());
     let sphere = PI / 6.0 * d.powi(3);
     let cells = extent.as_ref().and_then(|e| e.cells);
-    let phi = s.count.zip(volume).map(|(n, v)| (n * sphere / v).min(0.9));
+    let phi = count.zip(volume).map(|(n, v)| (n * sphere / v).min(0.9));
     let law = forces::by_name(&f.forces.drag).ok_or("forces.drag")?;
     let mean = phi.unwrap_or(0.0);
     let ratio = f.dem.coarse_graining.of_all();
@@ -52,7 +53,7 @@ pub fn scene(c: &Config) -> Result<Scene, String> {
     let drag = k(slip, 1.0 - mean) * slip;
     let mut scene = Scene {
         from: "the files of the case (estimates)".into(),
-        particles: s.count.map(Range::one).unwrap_or_default(),
+        particles: count.map(Range::one).unwrap_or_default(),
         cells,
         bounds: extent.as_ref().map(|e| [e.lower, e.upper]),
         diameter: Range::one(d),
@@ -93,6 +94,7 @@ fn terms(s: &mut Scene, c: &Config, drag: f64, weight: f64, phi: Option<f64>, hi
     let to = if drag >= weight { "drag" } else { "weight" };
     let (length, slip, speed) = (s.length(), s.slip.mean, s.fluid_speed.max);
     let mass = s.density.mean * sphere;
+    let cell = (!s.cell_size.is_empty()).then_some(s.cell_size.mean);
     let tau = if s.relaxation.is_empty() { s.stokes_time() } else { s.relaxation.mean };
     // nothing accelerates a particle against the fluid faster than the larger of drag and weight
     let fastest = scale / mass;
@@ -102,12 +104,19 @@ fn terms(s: &mut Scene, c: &Config, drag: f64, weight: f64, phi: Option<f64>, hi
     let model_a = f.coupling.model == Model::A;
     put("drag", drag / scale, to, "drag law at the slip above", f.forces.drag != "none", None, None);
     let shear = length.map_or(0.0, |l| 2.0 * speed / l);
-    let wave = phi.map_or(0.0, |p| p * drag / scale).max(rho * speed * shear * sphere / scale);
+    // how many particles there are may not be known: a bed packed to 0.6 is the most
+    let carried = phi.unwrap_or(0.6) * drag / scale;
+    let mean = norm(f.fluid.mean_pressure_gradient) * sphere / scale;
+    let wave = carried.max(rho * speed * shear * sphere / scale).max(mean);
     put(
         "pressure gradient",
         wave,
         to,
-        "estimate: carries the drag of the solids, or rho U2/L",
+        if phi.is_some() {
+            "estimate: carries the drag of the solids, or rho U2/L"
+        } else {
+            "estimate: carries the drag of a bed packed to 0.6"
+        },
         model_a && f.forces.pressure_gradient,
         Some("coupling.model = \"A\", forces.pressure_gradient = true"),
         Some("coupling.model = \"B\", forces.pressure_gradient = false"),
@@ -183,11 +192,14 @@ fn terms(s: &mut Scene, c: &Config, drag: f64, weight: f64, phi: Option<f64>, hi
         Some("coupling.feedback = \"one-way\""),
     );
     let given = p * drag / sphere * length.unwrap_or(0.0) / (rho * (1.0 - p) * speed * speed);
+    // what one particle gives to its own cell of size h while it passes: K u/(rho h2 u2), of its slip
+    let own = cell.map_or(f64::INFINITY, |h| drag / (rho * h * h * slip * slip));
+    let given = given.max(own);
     put(
         "feedback on the fluid",
         if given.is_finite() { given } else { 1.0 },
         "rho U2/L",
-        "estimate: drag of the mean solids",
+        "estimate: drag of the mean solids, of one in its cell",
         two_way,
         Some("coupling.feedback = \"two-way\""),
         Some("coupling.feedback = \"one-way\""),

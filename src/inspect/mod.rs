@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `voidage inspect`: what a scene is made of, which terms matter in it, and what `auto` would switch on (design §2.4).
 //!
-//! `recorded` measures a scene on the exchanges of a recording, `expected` estimates it from the files of a case; `decide`
+//! `measure` sums the magnitudes of an exchange; `recorded` does so for the exchanges of a recording, `expected` estimates it from the files of a case; `decide`
 //! compares the magnitudes with the accuracy asked. Reads SI units; changes nothing.
 
 pub mod decide;
 pub mod expected;
+pub mod measure;
 pub mod recorded;
 
 use std::fmt;

@@ -51,6 +51,9 @@ pub struct State {
     /// the monitor's row of this exchange, closed by the next one
     pub row: Row,
     pub books: Books,
+    /// forces `auto` has on from the next exchange on (`Watch::in_force`)
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub in_force: Option<u32>,
     /// ε at the end of the fluid step, by cell slot
     #[serde(skip)]
     pub voidage: Vec<f64>,

@@ -70,7 +70,7 @@ pub fn forecast(c: &Config) -> Result<Forecast, String> {
     let cells = foam::extent(&c.fluid_case()).and_then(|e| e.cells);
     let cells = cells.ok_or("the number of cells is not in system/blockMeshDict")?;
     let s = script::read(&c.script(), &c.file.dem.variables)?;
-    let n = s.count.ok_or("the script reads no data file that tells the number of particles")?;
+    let n = s.count.or(s.placed).ok_or("the script reads no data file that tells the number of particles")?;
     Ok(of(c, n as u64, cells as u64))
 }
 

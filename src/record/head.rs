@@ -65,6 +65,13 @@ pub enum Head {
     Row(Row),
     /// Where recorded exchanges begin. Payload: pairs of exchange and byte.
     Index,
+    /// Forces in force in exchange `k`, behind its begin, if `auto` may switch them; no payload.
+    Choice {
+        /// the exchange
+        k: i64,
+        /// bits in the order of `auto::SWITCHES`
+        on: u32,
+    },
 }
 
 /// Longest head, bytes.

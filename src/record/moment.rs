@@ -23,13 +23,15 @@ pub struct Messages {
     pub k: i64,
     /// fluid time at its end, s
     pub time: f64,
+    /// forces in force, where `auto` may switch them
+    pub on: Option<u32>,
     list: BTreeMap<(u32, u32), Vec<u64>>,
 }
 
 impl Messages {
     /// Of exchange k, none yet.
     pub fn new(k: i64, time: f64) -> Self {
-        Self { k, time, list: BTreeMap::new() }
+        Self { k, time, on: None, list: BTreeMap::new() }
     }
     /// Adds one.
     pub fn add(&mut self, partner: u32, kind: u32, words: Vec<u64>) {
@@ -220,6 +222,11 @@ impl<R: Read + Seek> Moments<R> {
                     }
                     _ => {}
                 },
+                Head::Choice { on, .. } => {
+                    if let Some(m) = &mut self.open {
+                        m.on = Some(on);
+                    }
+                }
                 Head::Row(row) => self.rows.push(row),
                 Head::Session(_) | Head::State { .. } | Head::Index => {}
             }

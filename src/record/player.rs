@@ -24,6 +24,8 @@ pub struct Begin {
     time: f64,
     /// voidage, velocity and velocity before, in one array
     pub state: Option<(usize, Vec<u64>)>,
+    /// forces that `auto` had on
+    pub on: Option<u32>,
 }
 
 /// Feeds recorded messages to the transports.
@@ -81,12 +83,20 @@ impl<R: Read + Seek> Player<R> {
             return Ok(false);
         };
         if let Head::Exchange { k, time } = chunk.head {
-            let mut begin = Begin { k, time, state: None };
-            // what the step carries follows at once, if it is there
-            if let Some(next) = self.reader.next()? {
+            let mut begin = Begin { k, time, state: None, on: None };
+            // what is in force and what the step carries follow at once, if they are there
+            while let Some(next) = self.reader.next()? {
                 match next.head {
-                    Head::State { cells, .. } => begin.state = Some((cells as usize, next.words)),
-                    _ => self.take(next)?,
+                    // of another exchange: damage that the replies show
+                    Head::Choice { k: of, on } => begin.on = Some(on).filter(|_| of == k),
+                    Head::State { cells, .. } => {
+                        begin.state = Some((cells as usize, next.words));
+                        break;
+                    }
+                    _ => {
+                        self.take(next)?;
+                        break;
+                    }
                 }
             }
             self.begin = Some(begin);

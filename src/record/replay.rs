@@ -75,6 +75,7 @@ const FIXED: &[&str] = &[
     "dem.variables",
     "coupling.interval",
     "output.",
+    "auto.",
     "record.",
     "limits.wait",
 ];
@@ -259,7 +260,10 @@ pub fn each<R: Read + Seek + 'static>(
     }
     let mesh = receive_mesh(&mut partners).map_err(|e| told(&e))?;
     let cells = mesh.len();
-    let step = setup::step(&config, mesh).map_err(ReplayError::Run)?;
+    let mut step = setup::step(&config, mesh).map_err(ReplayError::Run)?;
+    if let Some(w) = step.watch() {
+        w.follow();
+    }
     let mut run = Exchange {
         partners,
         step,
@@ -288,7 +292,7 @@ pub fn each<R: Read + Seek + 'static>(
     let mut checked = false;
     loop {
         let next = player.borrow_mut().next_exchange()?;
-        let Some(Begin { k, state, .. }) = next else { break };
+        let Some(Begin { k, state, on, .. }) = next else { break };
         if !checked {
             missing(&config, &player.borrow().told)?;
             checked = true;
@@ -306,6 +310,9 @@ pub fn each<R: Read + Seek + 'static>(
             }
             None if k == 0 || before == Some(k - 1) => {}
             None => return Err(carry("what the exchange before left is not in the recording").into()),
+        }
+        if let Some(bits) = on {
+            run.step.put_in_force(bits);
         }
         let clock = |run: &Exchange<_>| threads::cpu_seconds(run.pool.as_ref());
         player.borrow_mut().reading = 0.0;

@@ -136,6 +136,9 @@ impl Recorder {
         }
         self.0.borrow_mut().last = Some(k);
         self.put(Head::Exchange { k, time }, Vec::new())?;
+        if let Some(on) = step.in_force() {
+            self.put(Head::Choice { k, on }, Vec::new())?;
+        }
         if k == 0 || follows {
             return Ok(());
         }

@@ -56,8 +56,11 @@ impl CouplingStep {
             }
         });
         self.predicted = out;
-        if self.setup.extra.forces() {
+        let x = &self.setup.extra;
+        if x.forces() || x.sends_added_mass() || x.sends_memory() {
             self.extra_forces(p);
+        } else {
+            self.extra.clear();
         }
     }
 
@@ -155,15 +158,20 @@ impl CouplingStep {
             kinematic_viscosity: s.kinematic_viscosity,
         };
         let (inside, d) = (self.order.inside, &mut self.drive);
-        let (added, memory) = (if s.extra.felderhof { p.len() } else { 0 }, p.asked.memory.len());
+        let added = if s.extra.sends_added_mass() { p.len() } else { 0 };
+        let memory = if s.extra.history { p.asked.memory.len() } else { p.len() };
         d.added_mass.clear();
         d.added_mass.resize(added, 0.0);
         d.memory.clear();
-        d.memory.resize(if s.extra.history { memory } else { 0 }, Memory::default());
+        d.memory.resize(if s.extra.sends_memory() { memory } else { 0 }, Memory::default());
+        if !s.extra.forces() {
+            // all zero: kept ready, and off
+            return;
+        }
         let solid = |i: usize| if s.extra.felderhof { self.weights.gather(&self.work, i)[0] } else { 0.0 };
         let coefficient = |i: usize| s.extra.coefficient(solid(i), p.mass[i] / (p.volume(i) * s.density));
         let coefficients: Vec<f64> =
-            (0..if s.extra.felderhof { inside } else { 0 }).map(coefficient).collect();
+            (0..if s.extra.sends_added_mass() { inside } else { 0 }).map(coefficient).collect();
         for (i, m) in coefficients.iter().enumerate() {
             d.added_mass[i] = m * s.density * p.volume(i);
         }

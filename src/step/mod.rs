@@ -14,8 +14,10 @@ mod types;
 pub use types::{Drive, Facts, Fluid, Seconds, Setup, Sources, StepError};
 
 use crate::arrange::{Order, Places};
+use crate::auto::{Change, Watch};
 use crate::balance::Books;
 use crate::forces::Extra;
+use crate::inspect::measure::View;
 use crate::linearise::Predictions;
 use crate::locate::{Locator, Lost};
 use crate::map::{Mapping, Weights};
@@ -81,6 +83,8 @@ pub struct CouplingStep {
     smoothed: Vec<Lanes>,
     /// continues the solids velocity into void cells, for schemes that want it so
     pinned: Option<Pinned>,
+    /// measures the terms and switches forces
+    watch: Option<Watch>,
     /// Voidage and sources of this step.
     pub sources: Sources,
     /// Reply to the DEM.
@@ -138,6 +142,7 @@ impl CouplingStep {
             mapped: Vec::new(),
             smoothed: Vec::new(),
             pinned: None,
+            watch: None,
             sources: Sources {
                 voidage: vec![1.0; n],
                 voidage_old: vec![1.0; n],
@@ -170,6 +175,43 @@ impl CouplingStep {
     /// The solids velocity of void cells is continued from the filled ones, which are held fixed.
     pub fn with_pinned(self, pinned: Option<Pinned>) -> Self {
         Self { pinned, ..self }
+    }
+
+    /// Forces are switched during the run (`auto`).
+    pub fn with_watch(self, watch: Option<Watch>) -> Self {
+        Self { watch, ..self }
+    }
+
+    /// The watch of this run.
+    pub fn watch(&mut self) -> Option<&mut Watch> {
+        self.watch.as_mut()
+    }
+
+    /// The forces in force, of those that may be switched (`Watch::in_force`); `None`: nothing is chosen.
+    pub fn in_force(&self) -> Option<u32> {
+        self.watch.as_ref().map(Watch::in_force)
+    }
+
+    /// Puts them in force for the coming exchange (restart, recording).
+    pub fn put_in_force(&mut self, bits: u32) {
+        if let Some(w) = &mut self.watch {
+            w.put(bits);
+            w.apply(&mut self.setup.extra);
+        }
+    }
+
+    /// Exchange k is over (after `after_fluid`): measures it if that is due, and switches forces for the next one.
+    pub fn reconsider(&mut self, k: i64, p: &Particles, fluid: &Fluid) -> Vec<Change> {
+        let Some(w) = &mut self.watch else { return Vec::new() };
+        let mut changes = Vec::new();
+        if w.due(k) {
+            let (mesh, hosts, sources, drive) = (&self.mesh, &self.hosts[..], &self.sources, &self.drive);
+            let view = View { mesh, particles: p, hosts, fluid, sources, drive, before: None };
+            changes = w.reconsider(k, &view);
+            w.apply(&mut self.setup.extra);
+        }
+        w.keep(k, p, &fluid.velocity);
+        changes
     }
 
     /// What the step carries from one exchange to the next: voidage, fluid velocity (m/s), and that of one step earlier
@@ -332,7 +374,8 @@ impl CouplingStep {
     /// Stage 9 (pass c): the new fluid smoothed by the same G, read at the particles; the impulse charged.
     pub fn after_fluid(&mut self, p: &Particles, fluid: &Fluid, first: bool) -> Result<(), StepError> {
         let begin = Instant::now();
-        if self.setup.extra.added() && !first {
+        let x = &self.setup.extra;
+        if (x.added() || x.added_mass_sent) && !first {
             self.fluid_before.clone_from(&self.fluid_velocity);
         }
         self.take_fluid(fluid)?;

@@ -197,6 +197,11 @@ pub fn cloud(n: usize, size: [f64; 3], r: f64) -> Vec<P> {
 
 /// A PARTICLES frame; density 1000 kg/m3.
 pub fn message(list: &[P]) -> Vec<u64> {
+    message_with(list, &[])
+}
+
+/// The same with what the coupler gave the particles to keep, if there is any.
+pub fn message_with(list: &[P], memory: &[f64]) -> Vec<u64> {
     let n = list.len();
     let mut blocks = vec![Block::i64s(field::ID, n), Block::f64s(field::TOTALS, 9)];
     let vectors = [field::POSITION, field::VELOCITY, field::LEDGER, field::IMPULSE];
@@ -205,8 +210,14 @@ pub fn message(list: &[P]) -> Vec<u64> {
     blocks.extend(last.map(|f| Block::f64s(f, 3 * n)));
     blocks.push(Block::f64s(field::LAST_DRAG_COEFFICIENT, n));
     blocks.extend([field::RADIUS, field::MASS].map(|f| Block::f64s(f, n)));
+    if !memory.is_empty() {
+        blocks.push(Block::f64s(field::LAST_MEMORY, memory.len()));
+    }
     let mut words = vec![0; frame::words(&blocks)];
     frame::start(&mut words, kind::PARTICLES, 0, 0.0, &blocks);
+    if let Some(to) = frame::f64s_mut(&mut words, field::LAST_MEMORY) {
+        to.copy_from_slice(memory);
+    }
     for (i, p) in list.iter().enumerate() {
         frame::array_mut(&mut words, field::ID).unwrap()[i] = p.id as u64;
         for (f, value) in [(field::POSITION, p.x), (field::VELOCITY, p.v), (field::LEDGER, p.ledger)] {

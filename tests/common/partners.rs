@@ -2,7 +2,7 @@
 //! A fluid and a particle program made for tests, on threads, and a recorded run of the coupler with them in memory.
 #![allow(dead_code)]
 
-use super::{Hex, P, cloud, message};
+use super::{Hex, P, cloud, message_with};
 use std::path::Path;
 use std::time::Duration;
 use voidage::config::{self, Compression, Config, foam::Control};
@@ -11,10 +11,11 @@ use voidage::mesh::{MeshPiece, PatchKind};
 use voidage::partners::Partners;
 use voidage::record::{Recorded, Recorder, Selection, SessionHead};
 use voidage::setup;
-use voidage::step::CouplingStep;
 use voidage_wire::memory::{self, Memory};
 use voidage_wire::transport::send_copy;
-use voidage_wire::{Block, Frame, Hello, PROTOCOL, Process, Role, Transport, field, frame, hello, kind};
+use voidage_wire::{
+    Block, Frame, Hello, PROTOCOL, Process, Role, Transport, Welcome, field, frame, hello, kind,
+};
 
 pub const SIZE: [f64; 3] = [0.02, 0.02, 0.04];
 const PERIOD: f64 = 2e-4;
@@ -46,12 +47,14 @@ pub fn case(set: &[(&str, &str)], steps: i64) -> Config {
     config::recorded(CASE, &set, control).unwrap()
 }
 
-fn greet(t: &mut Memory, role: Role, rank: u32, size: u32) {
+/// What the coupler wants to be sent.
+fn greet(t: &mut Memory, role: Role, rank: u32, size: u32) -> Welcome {
     let time_step = if role == Role::Dem { 1e-5 } else { PERIOD };
     let (token, program, process) = ("test".to_string(), "made".to_string(), Process::own());
     let h = Hello { token, role, rank, size, time_step, step: 0, time: 0.0, program, process };
     send_copy(t, &frame::text_frame(kind::HELLO, 0, &hello::encode(&h))).unwrap();
-    next(t);
+    let words = next(t);
+    hello::decode(Frame::parse(&words).unwrap().bytes(field::TEXT).unwrap()).unwrap()
 }
 
 fn next(t: &mut Memory) -> Vec<u64> {
@@ -60,10 +63,12 @@ fn next(t: &mut Memory) -> Vec<u64> {
 
 /// Particles driven by K (u − v) + f, explicitly; the ledger is kept as the fix does.
 fn dem(mut t: Memory, rank: u32, size: u32, mut list: Vec<P>) {
-    greet(&mut t, Role::Dem, rank, size);
+    let told = greet(&mut t, Role::Dem, rank, size).settings;
+    // what the coupler remembers of each particle
+    let mut memory = vec![0.0; told["drive.memory"] as usize * list.len()];
     let mut totals = [0.0; 9];
     for k in 0.. {
-        let mut words = message(&list);
+        let mut words = message_with(&list, &memory);
         words[2] = k as u64;
         frame::f64s_mut(&mut words, field::TOTALS).unwrap().copy_from_slice(&totals);
         send_copy(&mut t, &words).unwrap();
@@ -73,6 +78,10 @@ fn dem(mut t: Memory, rank: u32, size: u32, mut list: Vec<P>) {
             return;
         }
         let n = list.len();
+        if !memory.is_empty() {
+            memory = f.f64s_of(field::MEMORY, memory.len()).unwrap().to_vec();
+        }
+        assert_eq!(f.raw(field::ADDED_MASS).is_some(), told["drive.added_mass"] != 0.0);
         let (c, u) =
             (f.f64s(field::DRAG_COEFFICIENT).unwrap(), f.vectors_of(field::DRIVE_VELOCITY, n).unwrap());
         let (g, q) = (f.vectors_of(field::FORCE, n).unwrap(), f.vectors_of(field::CHARGED, n).unwrap());
@@ -233,9 +242,7 @@ pub fn record_in(
         partners.welcome(i, &welcome).unwrap();
     }
     let mesh = receive_mesh(&mut partners).unwrap();
-    let [smoother, positive] = setup::smoothers(c, &mesh).unwrap();
-    let mapping = setup::mapping(c, &mesh).unwrap();
-    let step = CouplingStep::new(mesh, setup::setup(c).unwrap(), mapping, smoother, positive);
+    let step = setup::step(c, mesh).unwrap();
     let mut run = Exchange {
         partners,
         step,
