@@ -112,7 +112,9 @@ impl Chart {
         let px = |v: f64| LEFT + x.at(v) * SIZE[0];
         let py = |v: f64| TOP + (1.0 - y.at(v)) * SIZE[1];
         let (right, bottom) = (LEFT + SIZE[0], TOP + SIZE[1]);
-        let rows = self.curves.len().div_ceil(3);
+        let longest = self.curves.iter().map(|c| c.name.chars().count()).max().unwrap_or(0);
+        let columns = if longest > 28 { 2 } else { 3 };
+        let rows = self.curves.len().div_ceil(columns);
         let (width, height) = (right + 20.0, bottom + 56.0 + 18.0 * rows as f64);
         let mut s = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
@@ -176,7 +178,10 @@ impl Chart {
                 "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\"/>",
                 points.join(" ")
             );
-            let (lx, ly) = (LEFT + 195.0 * (i % 3) as f64, bottom + 52.0 + 18.0 * (i / 3) as f64);
+            let (lx, ly) = (
+                LEFT + SIZE[0] / columns as f64 * (i % columns) as f64,
+                bottom + 52.0 + 18.0 * (i / columns) as f64,
+            );
             let _ = writeln!(
                 s,
                 "<path d=\"M{lx} {0}h18\" stroke=\"{colour}\" stroke-width=\"2\"/><text x=\"{1}\" y=\"{ly}\">{2}</text>",

@@ -5,14 +5,14 @@ mod common;
 
 use common::folder::Folder;
 use std::path::Path;
-use voidage::commands::{BAD_INPUT, OK, report, stability};
+use voidage::commands::{BAD_INPUT, OK, report, stability, tune};
 
 fn recording() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/recordings/whole.voidage")
 }
 
-fn write(file: &Path, into: &Path, stability: Option<&Path>) -> u8 {
-    report::report(file, &report::Options { into: Some(into), accuracy: 1e-2, tune: None, stability })
+fn write(file: &Path, into: &Path, tune: Option<&Path>, stability: Option<&Path>) -> u8 {
+    report::report(file, &report::Options { into: Some(into), accuracy: 1e-2, tune, stability })
 }
 
 /// Every tag that opens closes, in order.
@@ -48,7 +48,20 @@ fn a_report_is_one_page_that_fetches_nothing() {
     assert!(growth["growth"][1]["limit_s"].as_f64().unwrap() > 0.0, "{growth}");
     assert!(folder.path().join("stability-held.svg").is_file());
 
-    assert_eq!(write(&recording(), folder.path(), Some(&json)), OK);
+    let tuned = folder.path().join("tune.json");
+    let (set, only) = ([], ["smoother".to_string()]);
+    let (write_to, json_to, all) = (None, Some(tuned.as_path()), false);
+    let ask = tune::Options {
+        set: &set,
+        accuracy: 1e-3,
+        exchanges: 3,
+        only: &only,
+        write: write_to,
+        json: json_to,
+        all,
+    };
+    assert_eq!(tune::tune(&recording(), &ask), OK);
+    assert_eq!(write(&recording(), folder.path(), Some(&tuned), Some(&json)), OK);
     let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     well_formed(&page);
     for what in [
@@ -70,7 +83,9 @@ fn a_report_is_one_page_that_fetches_nothing() {
     );
     assert!(page.matches("src=\"data:image/png;base64,").count() == 4, "three slices and their colours");
     assert!(page.matches("<svg").count() >= 5 && page.contains(">explicit</td>"));
-    for name in ["conservation.svg", "time.svg", "stability-free.svg", "solid-fraction-xy.png"] {
+    assert!(page.contains("<td>chosen</td>") && page.contains("[smooth]"), "what tune chose");
+    for name in ["conservation.svg", "time.svg", "tuning.svg", "stability-free.svg", "solid-fraction-xy.png"]
+    {
         assert!(folder.path().join(name).is_file(), "{name}");
     }
 }
@@ -78,11 +93,12 @@ fn a_report_is_one_page_that_fetches_nothing() {
 #[test]
 fn what_is_no_run_is_named() {
     let folder = Folder::new("no-report");
-    assert_eq!(write(folder.path(), folder.path(), None), BAD_INPUT);
-    assert_eq!(write(&folder.path().join("none.voidage"), folder.path(), None), BAD_INPUT);
+    assert_eq!(write(folder.path(), folder.path(), None, None), BAD_INPUT);
+    assert_eq!(write(&folder.path().join("none.voidage"), folder.path(), None, None), BAD_INPUT);
     let other = folder.path().join("other.json");
     std::fs::write(&other, "{}").unwrap();
-    assert_eq!(write(&recording(), folder.path(), Some(&other)), BAD_INPUT);
+    assert_eq!(write(&recording(), folder.path(), None, Some(&other)), BAD_INPUT);
+    assert_eq!(write(&recording(), folder.path(), Some(&other), None), BAD_INPUT);
     let options =
         stability::Options { set: &[], exchange: Some(77), scheme: Some("explicit"), map: None, json: None };
     assert_eq!(stability::stability(&recording(), &options), BAD_INPUT);

@@ -58,6 +58,12 @@ pub fn report(path: &Path, o: &Options) -> u8 {
             return BAD_INPUT;
         }
     };
+    if tune.as_ref().is_some_and(|t| !t["points"].is_array()) {
+        let given = o.tune.map(|p| p.display().to_string()).unwrap_or_default();
+        let fix = "voidage tune FILE --accuracy 1e-3 --json tune.json";
+        print(&[Problem::error("--tune", given, "a file of `voidage tune --json`", fix)]);
+        return BAD_INPUT;
+    }
     let file = if path.is_dir() { path.join("recording.voidage") } else { path.to_path_buf() };
     let found = if file.is_file() { of_recording(&file) } else { of_case(path) };
     let found = match found {

@@ -7,6 +7,7 @@ use super::Content;
 use crate::monitor::Row;
 use crate::plot::{Axis, Chart, Curve};
 use crate::stability::picture;
+use serde_json::Value;
 
 /// Points of a history at most.
 const POINTS: usize = 400;
@@ -30,6 +31,35 @@ fn chart(title: &str, y: Axis, curves: Vec<(&str, Vec<(f64, f64)>)>, lines: Vec<
     let curves = curves.into_iter().filter(|c| !c.1.is_empty());
     let curves = curves.map(|(name, points)| Curve { name: name.into(), points }).collect();
     Chart { title: title.into(), x: axis("time, s", false), y, curves, lines, marks: vec![] }.svg()
+}
+
+/// CPU time over numerical error, a curve for each mapping, interpolation and smoother.
+fn tuning(points: &[Value]) -> String {
+    let mut curves: Vec<Curve> = Vec::new();
+    for p in points {
+        let text = |key: &str| p["settings"][key].as_str().unwrap_or_default();
+        let name = format!("{}, {}, {}", text("smoother"), text("mapping"), text("interpolation"));
+        let point =
+            (p["error"].as_f64().unwrap_or(f64::NAN).max(1e-16), p["ms"].as_f64().unwrap_or(f64::NAN));
+        match curves.iter_mut().find(|c| c.name == name) {
+            Some(c) => c.points.push(point),
+            None => curves.push(Curve { name, points: vec![point] }),
+        }
+    }
+    // one smoother at several tolerances is a curve; what was measured once is in the table
+    curves.retain(|c| c.points.len() > 2);
+    curves.sort_by(|a, b| b.points.len().cmp(&a.points.len()));
+    curves.truncate(8);
+    curves.iter_mut().for_each(|c| c.points.sort_by(|a, b| a.0.total_cmp(&b.0)));
+    Chart {
+        title: "CPU time of the coupler per exchange over numerical error".into(),
+        x: axis("largest relative L2 error of voidage, force and momentum source", true),
+        y: axis("ms", false),
+        curves,
+        lines: vec![("0".into(), 0.0)],
+        marks: vec![],
+    }
+    .svg()
 }
 
 /// Name and SVG of each picture there is something for.
@@ -62,6 +92,9 @@ pub fn all(c: &Content) -> Vec<(&'static str, String)> {
             "time",
             chart("Wall time per step", axis("ms (largest of each part of the run)", true), time, vec![]),
         ));
+    }
+    if let Some(points) = c.tune.as_ref().and_then(|t| t.get("points")?.as_array()) {
+        list.push(("tuning", tuning(points)));
     }
     if let Some((growths, marks)) = &c.stability {
         let marks: Vec<(&str, f64)> = marks.iter().map(|m| (m.0.as_str(), m.1)).collect();

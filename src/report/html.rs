@@ -7,6 +7,7 @@ use super::{Content, charts, slice};
 use crate::inspect::decide;
 use crate::monitor::Row;
 use crate::plot::escape;
+use serde_json::Value;
 use std::fmt::Write;
 
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1240px;margin:2em auto;padding:0 1em;color:#222}
@@ -66,6 +67,7 @@ pub fn page(c: &Content) -> std::io::Result<String> {
     terms(&mut s, c);
     s += "<h2>Speed and accuracy</h2>\n";
     tune(&mut s, c);
+    figure(&mut s, &["tuning"]);
     s += "<h2>Stability</h2>\n";
     stability(&mut s, c);
     figure(&mut s, &["stability-free", "stability-held"]);
@@ -222,8 +224,52 @@ fn terms(s: &mut String, c: &Content) {
 }
 
 fn tune(s: &mut String, c: &Content) {
-    if c.tune.is_none() {
+    let Some(t) = &c.tune else {
         *s += "<p>Not measured: <code>voidage tune FILE --accuracy 1e-3 --json tune.json</code>, then <code>voidage report … --tune tune.json</code>.</p>\n";
+        return;
+    };
+    let number = |v: &Value| v.as_f64().map_or_else(|| "–".into(), |x| format!("{x:.1e}"));
+    let _ = writeln!(
+        s,
+        "<p>Settings measured on the recording that are cheapest for their error (asked for: {}); the exact Gaussians: {}.</p>",
+        number(&t["accuracy"]),
+        escape(t["gaussian"].as_str().unwrap_or("not known"))
+    );
+    *s += "<table><tr><th>mapping</th><th>fluid velocity</th><th>smoother</th><th class=\"n\">tolerance</th><th class=\"n\">CPU, ms per exchange</th>\
+           <th class=\"n\">numerical error</th><th class=\"n\">model error</th><th></th></tr>\n";
+    for p in t["points"].as_array().into_iter().flatten() {
+        let is = |key: &str| p[key].as_bool().unwrap_or(false);
+        let chosen = t["chosen"]["settings"] == p["settings"];
+        if !(is("front") || is("recorded") || chosen) {
+            continue;
+        }
+        let q = |key: &str| escape(p["settings"][key].as_str().unwrap_or_default());
+        let note = [
+            (chosen, "chosen"),
+            (is("recorded"), "the case"),
+            (!is("conservative"), "third law not to rounding"),
+        ];
+        let note: Vec<&str> = note.into_iter().filter(|n| n.0).map(|n| n.1).collect();
+        let _ = writeln!(
+            s,
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{:.3}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td>{}</td></tr>",
+            q("mapping"),
+            q("interpolation"),
+            q("smoother"),
+            number(&p["settings"]["tolerance"]),
+            p["ms"].as_f64().unwrap_or(f64::NAN),
+            number(&p["error"]),
+            number(&p["model"]["l2"]),
+            note.join(", ")
+        );
+    }
+    *s += "</table>\n";
+    if let Some(section) = t["section"].as_str() {
+        let _ = writeln!(
+            s,
+            "<p>The cheapest that are exact enough, for case.toml:</p>\n<pre>{}</pre>",
+            escape(section)
+        );
     }
 }
 
