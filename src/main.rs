@@ -141,14 +141,14 @@ enum Command {
         #[arg(long)]
         all: bool,
     },
-    /// Writes a recording as ParaView series or as CSV tables, with its monitor
+    /// Writes a recording as ParaView series or as tables (CSV, Parquet), with its monitor
     Export {
         /// recording
         file: PathBuf,
         /// folder, new or empty [default: beside the recording, named after it]
         #[arg(long, value_name = "FOLDER")]
         into: Option<PathBuf>,
-        /// vtk (.pvd with .vtu and .vtp) or csv
+        /// vtk (.pvd with .vtu and .vtp), csv or parquet
         #[arg(long, default_value = "vtk")]
         format: String,
         /// every n-th recorded exchange

@@ -59,6 +59,32 @@ pub struct Row {
     pub given: [f64; 3],
 }
 
+impl Row {
+    /// In the order of `COLUMNS`; NaN for what is not there.
+    pub fn values(&self) -> [f64; COLUMNS.len()] {
+        [
+            self.step as f64,
+            self.time,
+            self.particles as f64,
+            self.solid_fraction_max,
+            self.solid_volume_error,
+            self.solid_momentum_error,
+            self.action_reaction_error.unwrap_or(f64::NAN),
+            self.ledger_momentum,
+            self.ledger_left,
+            self.positive_redone as f64,
+            self.excluded as f64,
+            self.capped_volume,
+            self.coupler,
+            self.wait_dem,
+            self.wait_cfd,
+            self.given[0],
+            self.given[1],
+            self.given[2],
+        ]
+    }
+}
+
 /// The open file.
 pub struct Monitor {
     file: BufWriter<File>,

@@ -324,6 +324,21 @@ fn a_scene_is_measured_on_a_recording() {
     assert!(decide::advice(&s, 1e-5).iter().any(|a| a.contains("forces.lift = \"loth\"")));
 }
 
+/// Names and values of a Parquet file of doubles.
+fn parquet(file: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    let reader = SerializedFileReader::new(std::fs::File::open(file).unwrap()).unwrap();
+    let fields = reader.metadata().file_metadata().schema().get_fields().to_vec();
+    let mut columns = vec![Vec::new(); fields.len()];
+    for row in reader.get_row_iter(None).unwrap() {
+        for (i, (_, field)) in row.unwrap().get_column_iter().enumerate() {
+            let parquet::record::Field::Double(x) = field else { panic!("{field}") };
+            columns[i].push(*x);
+        }
+    }
+    (fields.iter().map(|f| f.name().to_string()).collect(), columns)
+}
+
 #[test]
 fn a_recording_is_exported_as_series_and_tables() {
     let bytes = recorded("export", &[("record.every", "2")], 5, [2, 2]);
@@ -352,6 +367,19 @@ fn a_recording_is_exported_as_series_and_tables() {
     assert_eq!(column(&particles, "velocity_z"), x.velocity.iter().map(|v| v[2]).collect::<Vec<_>>());
     assert_eq!(table(&read("csv/exchanges.csv"))[2], ["1", "2", "0.0004"]);
     assert_eq!(table(&read("csv/monitor.csv")).len(), 7, "rows of all exchanges");
+    // the same numbers as Parquet, to the bit
+    let mut m = Moments::new(open(&bytes).unwrap()).unwrap();
+    assert_eq!(export(&mut m, &folder.join("parquet"), Format::Parquet, 1).unwrap(), (3, 6));
+    for (name, csv) in [("particles_0001", &particles), ("cells_0001", &cells)] {
+        let (names, columns) = parquet(&folder.join(format!("parquet/{name}.parquet")));
+        assert_eq!(names, csv[0]);
+        for (name, values) in names.iter().zip(&columns) {
+            assert_eq!(*values, column(csv, name), "{name}");
+        }
+    }
+    let (names, columns) = parquet(&folder.join("parquet/monitor.parquet"));
+    assert!(names.len() == 18 && names[1] == "time_s" && columns.iter().all(|c| c.len() == 6));
+    assert_eq!(columns[0], [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
     let mut m = Moments::new(open(&bytes).unwrap()).unwrap();
     assert_eq!(export(&mut m, &folder.join("vtk"), Format::Vtk, 2).unwrap(), (2, 6));
     assert_eq!(read("vtk/cells.pvd").matches("<DataSet").count(), 2);

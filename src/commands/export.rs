@@ -10,13 +10,9 @@ use std::path::{Path, PathBuf};
 
 /// `voidage export FILE`
 pub fn export(file: &Path, into: Option<&Path>, format: &str, every: usize) -> u8 {
-    let kind = match format {
-        "vtk" => Format::Vtk,
-        "csv" => Format::Csv,
-        _ => {
-            eprintln!("error: --format {format}: accepted: vtk, csv; type --format vtk");
-            return BAD_INPUT;
-        }
+    let Some(kind) = Format::by_name(format) else {
+        eprintln!("error: --format {format}: accepted: {}; type --format vtk", Format::NAMES.join(", "));
+        return BAD_INPUT;
     };
     if every == 0 {
         eprintln!("error: --every 0: a number of exchanges, at least 1; type --every 10");

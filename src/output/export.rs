@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `voidage export`: a recording as ParaView series (`vtk`) or tables, and its monitor.
 //!
-//! Writes what was recorded, without computing anything anew. Tables are CSV with a line of names, SI units: one file of
-//! cells and one of particles per exchange, numbered like the series. Holds one exchange at a time.
+//! Writes what was recorded, without computing anything anew. Tables are CSV with a line of names, or Parquet, SI units: one
+//! file of cells and one of particles per exchange, numbered like the series. Holds one exchange at a time.
 
-use super::Fields;
 use super::vtk::{self, Data, Grid, Series};
+use super::{Fields, parquet};
 use crate::monitor::Monitor;
 use crate::record::RecordError;
 use crate::record::moment::Moments;
@@ -20,6 +20,18 @@ pub enum Format {
     Vtk,
     /// .csv
     Csv,
+    /// .parquet
+    Parquet,
+}
+
+impl Format {
+    /// Names on the command line.
+    pub const NAMES: &[&str] = &["vtk", "csv", "parquet"];
+    /// By name.
+    pub fn by_name(name: &str) -> Option<Self> {
+        let all = [Self::Vtk, Self::Csv, Self::Parquet];
+        Self::NAMES.iter().position(|n| *n == name).map(|i| all[i])
+    }
 }
 
 /// Exports every `every`-th recorded exchange to a folder that is made for it; (exchanges, rows of the monitor).
@@ -51,9 +63,15 @@ pub fn export<R: Read + Seek>(
                     .write(x.time, "vtp", |f| vtk::points(f, &p.position, &all.points(&id)))
                     .map_err(fail)?;
             }
-            Format::Csv => {
-                let open = |what: &str| {
-                    File::create(folder.join(format!("{what}_{written:04}.csv"))).map(BufWriter::new)
+            Format::Csv | Format::Parquet => {
+                let save = |what: &str, n: usize, columns: &[(&str, Data)]| {
+                    let file = folder.join(format!("{what}_{written:04}"));
+                    if format == Format::Csv {
+                        let file = File::create(file.with_extension("csv")).map(BufWriter::new);
+                        file.and_then(|f| table(f, n, columns))
+                    } else {
+                        File::create(file.with_extension("parquet")).and_then(|f| parquet::table(f, columns))
+                    }
                 };
                 let ids: Vec<f64> = m.mesh.ids.iter().map(|i| *i as f64).collect();
                 let mut cells = vec![
@@ -62,11 +80,11 @@ pub fn export<R: Read + Seek>(
                     ("volume", Data::Scalar(&m.mesh.volume)),
                 ];
                 cells.extend(all.cells());
-                open("cells").and_then(|f| table(f, m.mesh.len(), &cells)).map_err(fail)?;
+                save("cells", m.mesh.len(), &cells).map_err(fail)?;
                 let mut points = all.points(&id);
                 points.insert(1, ("position", Data::Vector(&p.position)));
                 points.push(("mass", Data::Scalar(&p.mass)));
-                open("particles").and_then(|f| table(f, p.len(), &points)).map_err(fail)?;
+                save("particles", p.len(), &points).map_err(fail)?;
             }
         }
         times.push((written, x.k, x.time));
@@ -79,6 +97,10 @@ pub fn export<R: Read + Seek>(
         f.flush()
     };
     list(&mut file).map_err(fail)?;
+    if format == Format::Parquet {
+        let file = File::create(folder.join("monitor.parquet"));
+        file.and_then(|f| parquet::monitor(f, &m.rows)).map_err(fail)?;
+    }
     let mut monitor = Monitor::create(&folder.join("monitor.csv"), false).map_err(fail)?;
     m.rows.iter().try_for_each(|r| monitor.write(r)).map_err(fail)?;
     Ok((written, m.rows.len()))

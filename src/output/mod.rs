@@ -3,6 +3,7 @@
 //! (`picture`), at the fluid's write times. Reads the step's fields; changes nothing.
 
 pub mod export;
+pub mod parquet;
 pub mod picture;
 pub mod restart;
 pub mod vtk;
