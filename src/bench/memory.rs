@@ -40,6 +40,7 @@ pub fn run(part: usize) -> Result<Memory, String> {
             drag: "koch-hill",
             mapping: "particle-centroid",
             repetitions: 1,
+            threads: None,
         })?;
         Ok::<_, String>((peak() - base_bytes, particles as f64 / part as f64, cost.cells as f64))
     };

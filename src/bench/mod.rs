@@ -2,6 +2,7 @@
 //! `voidage bench`: what the coupling step costs and how exact it is, on scenes made here.
 
 pub mod gauss;
+pub mod grid;
 pub mod memory;
 pub mod plot;
 pub mod report;

@@ -4,7 +4,7 @@
 //! Reads how thorough to be; writes numbers with their units in the field names. Ratios are of values measured in
 //! the same run; absolute times are those of this machine at this moment.
 
-use super::{memory, plot, scaling, scene, smoother, step, triad};
+use super::{grid, memory, plot, scaling, scene, smoother, step, triad};
 use serde::Serialize;
 
 /// All numbers of one run.
@@ -26,6 +26,10 @@ pub struct Report {
     pub memory: memory::Memory,
     /// how the step's cost grows
     pub scaling: Vec<scaling::Series>,
+    /// the step over particles, cells and bandwidths
+    pub grid: Vec<step::Cost>,
+    /// the step on two threads; none where there is one core
+    pub two_threads: Option<grid::Two>,
 }
 
 /// Whole coupling steps: all three passes, from locate to replies ready, Koch–Hill, model A.
@@ -84,6 +88,15 @@ pub fn run(quick: bool, mut say: impl FnMut(&str)) -> Result<Report, String> {
     let step = steps(quick, &mut say)?;
     say("cost over two decades of particles and cells");
     let scaling = scaling::run(if quick { 33_200 } else { 332_000 })?;
+    say("grid of particles, cells and bandwidths");
+    let grid = grid::run(if quick { 16_000 } else { 160_000 }, 5)?;
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let two_threads = if cores > 1 {
+        say("one thread and two");
+        Some(grid::two_threads(if quick { 33_200 } else { 332_000 }, if quick { 1 } else { 5 })?)
+    } else {
+        None
+    };
     say("smoother: the default against Crank-Nicolson, backward Euler and others");
     let smoother = smoothers(quick)?;
     let weights = |c: &step::Cost| c.map_ms * 1e3 / c.particles as f64;
@@ -99,6 +112,8 @@ pub fn run(quick: bool, mut say: impl FnMut(&str)) -> Result<Report, String> {
         smoother,
         memory,
         scaling,
+        grid,
+        two_threads,
     })
 }
 
@@ -114,6 +129,7 @@ pub fn steps(quick: bool, mut say: impl FnMut(&str)) -> Result<Steps, String> {
         drag: "koch-hill",
         mapping,
         repetitions: if quick { 5 } else { 12 },
+        threads: None,
     };
     let mut cases = Vec::new();
     for (particles, cells, mapping) in [
@@ -171,6 +187,19 @@ impl Report {
         for s in &self.scaling {
             let points = s.points.iter().map(|p| format!("  {} {} {:.3}", p.0, p.1, p.2)).collect::<String>();
             t += &format!("  {:20} N^{:.2}: {points}\n", s.grows, s.exponent);
+        }
+        t += "grid, particle centroid, us per particle (JSON: by stage)\n     cells particles";
+        t += &grid::WIDTHS.map(|w| format!("  b/h = {w}")).concat();
+        for row in self.grid.chunks(grid::WIDTHS.len()) {
+            t += &format!("\n  {:8} {:9}", row[0].cells, row[0].particles);
+            t += &row.iter().map(|c| format!(" {:8.3}", c.us_per_particle)).collect::<String>();
+        }
+        t += "\n";
+        if let Some(two) = &self.two_threads {
+            t += &format!(
+                "two threads: step {:.2} x faster than on one, triad {:.2} x; ratio {:.2}\n",
+                two.step_speedup, two.triad_speedup, two.ratio
+            );
         }
         t += &format!(
             "memory: {:.0} bytes per cell, {:.0} per particle\n",
@@ -274,6 +303,7 @@ mod tests {
             drag: "koch-hill",
             mapping: "divided-volume",
             repetitions: 2,
+            threads: None,
         };
         let c = super::step::run(&case).unwrap();
         assert!(c.us_per_particle.is_finite() && c.map_ms > 0.0 && c.solid_volume_error < 1e-12);

@@ -22,20 +22,26 @@ pub struct Series {
 /// Particles that fill a quarter of the box at `scene::DIAMETER`.
 const FILL: f64 = 332_000.0;
 /// b/h: that of b = 4 d on 166 000 cells.
-const WIDTH: f64 = 2.1;
+pub const WIDTH: f64 = 2.1;
 
-fn milliseconds(particles: usize, cells: usize) -> Result<f64, String> {
+/// A bed in a quarter of the box whatever its numbers; `width` is b/h.
+pub fn case(particles: usize, cells: usize, width: f64) -> step::Case {
     let h = (scene::BOX.iter().product::<f64>() / cells as f64).cbrt();
-    let cost = step::run(&step::Case {
+    step::Case {
         particles,
         diameter: scene::DIAMETER * (FILL / particles as f64).cbrt(),
         cells,
-        bandwidth: WIDTH * h,
+        bandwidth: width * h,
         tolerance: 1e-2,
         drag: "koch-hill",
         mapping: "particle-centroid",
         repetitions: 8,
-    })?;
+        threads: None,
+    }
+}
+
+fn milliseconds(particles: usize, cells: usize) -> Result<f64, String> {
+    let cost = step::run(&case(particles, cells, WIDTH))?;
     Ok(cost.us_per_particle * particles as f64 * 1e-3)
 }
 

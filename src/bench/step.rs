@@ -11,8 +11,9 @@ use crate::interpolate::FluidVelocity;
 use crate::map;
 use crate::smooth;
 use crate::step::{CouplingStep, Seconds, Setup};
-use crate::{forces, scheme};
+use crate::{forces, scheme, threads};
 use serde::Serialize;
+use std::time::Instant;
 
 /// The step to be timed.
 #[derive(Clone, Debug)]
@@ -33,6 +34,8 @@ pub struct Case {
     pub mapping: &'static str,
     /// timed repetitions
     pub repetitions: usize,
+    /// threads of the step, timed by the clock on the wall; none: this thread alone, by its CPU time
+    pub threads: Option<usize>,
 }
 
 /// What it cost.
@@ -44,6 +47,8 @@ pub struct Cost {
     pub particles: usize,
     /// cells
     pub cells: usize,
+    /// b, m
+    pub bandwidth: f64,
     /// sweeps of the smoother per pass
     pub degree: usize,
     /// best step, µs per particle
@@ -112,16 +117,24 @@ pub fn run(case: &Case) -> Result<Cost, String> {
         mapping: case.mapping,
         particles: p.len(),
         cells,
+        bandwidth: case.bandwidth,
         degree,
         us_per_particle: f64::INFINITY,
         ..Cost::default()
     };
     let mut all = Vec::new();
+    let pool = |n| rayon::ThreadPoolBuilder::new().num_threads(n).build();
+    let pool = case.threads.map(pool).transpose().map_err(|e| e.to_string())?;
+    let start = Instant::now();
+    let clock = || if case.threads.is_some() { start.elapsed().as_secs_f64() } else { cpu_seconds() };
     for k in 0..=case.repetitions {
-        let begin = cpu_seconds();
-        step.before_fluid(&mut p, k == 0).map_err(|e| e.to_string())?;
-        step.after_fluid(&p, &fluid, k == 0).map_err(|e| e.to_string())?;
-        let us = (cpu_seconds() - begin) * 1e6 / p.len() as f64;
+        let begin = clock();
+        threads::within(pool.as_ref(), || {
+            step.before_fluid(&mut p, k == 0)?;
+            step.after_fluid(&p, &fluid, k == 0)
+        })
+        .map_err(|e| e.to_string())?;
+        let us = (clock() - begin) * 1e6 / p.len() as f64;
         cost.solid_volume_error = cost.solid_volume_error.max(step.facts.solid_volume_error);
         for x in &mut p.position {
             (0..3).for_each(|a| x[a] += 2e-5 * (scene::random(&mut seed) - 0.5));
