@@ -250,6 +250,7 @@ fn exchange(
             );
         }
     };
+    let earlier = resume.as_ref().map_or(0, |s| s.exchange);
     let mut output = crate::output::Output::new(config, resume.as_ref().map(|s| s.time))
         .map_err(|e| format!("CASE/voidage: {e}"))?;
     // start and output are not what an exchange costs
@@ -299,7 +300,7 @@ fn exchange(
         s.worst_solid_volume,
         s.excluded,
         s.redone,
-        1e3 * exchanges / (s.steps.max(1) as f64)
+        1e3 * exchanges / ((s.steps - earlier).max(1) as f64)
     );
     Ok(())
 }

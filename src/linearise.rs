@@ -166,7 +166,14 @@ mod tests {
             let (slip, d) = ([2.0, 1.0, 0.0], [0.1, 0.2, 0.3]);
             // u^n = slip + v; in one cell, so the gathered velocity is that of the cell
             let gathered = [0, 1, 2].map(|a| slip[a] + v[a] - d[a]);
-            let before = Before { drag_coefficient: 0.7, slip, inertia: 0.01, period: dt, last: Some(last) };
+            let before = Before {
+                drag_coefficient: 0.7,
+                slip,
+                mass: 0.01,
+                inertia: 0.01,
+                period: dt,
+                last: Some(last),
+            };
             let q = Predicted::new(*scheme, &before, d, gathered);
             let s = linearise(&q, ledger, dt);
             for a in 0..3 {

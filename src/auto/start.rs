@@ -192,30 +192,6 @@ impl Choosing<'_> {
         }
     }
 
-    /// Why a force cannot be had in this case.
-    fn barred(&self, key: &str) -> Option<String> {
-        let f = &self.c.file;
-        match key {
-            super::ADDED_MASS if f.dem.force == InInterval::Constant => {
-                Some("it would need dem.force = \"implicit\"".into())
-            }
-            HISTORY => {
-                let (d, rho) = (self.scene.diameter.mean, self.scene.density.mean);
-                let ratios = f.dem.coarse_graining.by_type().into_iter();
-                let ratios = ratios.chain([f.dem.coarse_graining.of_all()]).filter(|r| *r >= 1.0);
-                let (nu, period) = (f.fluid.kinematic_viscosity, self.c.period());
-                let of = |r: f64| explicit_ratio(d / r, f.fluid.density, rho, nu, period);
-                let worst = ratios.map(of).fold(0.0, f64::max);
-                // the newest part goes with the square root of the step
-                (worst > STABLE).then(|| {
-                    let step = period * (STABLE / worst).powi(2);
-                    format!("the explicit force would need a fluid step of at most {step:.1e} s")
-                })
-            }
-            _ => None,
-        }
-    }
-
     fn force(&mut self, s: &Switch) {
         let (relative, _) = self.magnitude(s.term);
         let f = &self.c.file.forces;
@@ -229,7 +205,7 @@ impl Choosing<'_> {
             return self.row(s.term, "given", format!("{} = {value}", s.key), "");
         }
         let wanted = decide::hysteresis(on(f, s.key), relative, self.auto.accuracy);
-        if let Some(why) = self.barred(s.key) {
+        if let Some(why) = barred(self.c, s.key, &self.scene) {
             set(&mut self.c.file.forces, s.key, false);
             let choice = if wanted { "missing" } else { "off" };
             return self.row(s.term, choice, setting(s.key, false), if wanted { &why } else { "" });
@@ -258,5 +234,29 @@ impl Choosing<'_> {
         };
         let setting = format!("fluid.gravity_treatment = \"{name}\"");
         self.row("Archimedes", "given", setting, "costs nothing, never chosen");
+    }
+}
+
+/// Why a force cannot be had in this case.
+pub(super) fn barred(c: &Config, key: &str, scene: &Scene) -> Option<String> {
+    let f = &c.file;
+    match key {
+        super::ADDED_MASS if f.dem.force == InInterval::Constant => {
+            Some("it would need dem.force = \"implicit\"".into())
+        }
+        HISTORY => {
+            let (d, rho) = (scene.diameter.mean, scene.density.mean);
+            let ratios = f.dem.coarse_graining.by_type().into_iter();
+            let ratios = ratios.chain([f.dem.coarse_graining.of_all()]).filter(|r| *r >= 1.0);
+            let (nu, period) = (f.fluid.kinematic_viscosity, c.period());
+            let of = |r: f64| explicit_ratio(d / r, f.fluid.density, rho, nu, period);
+            let worst = ratios.map(of).fold(0.0, f64::max);
+            // the newest part goes with the square root of the step
+            (worst > STABLE).then(|| {
+                let step = period * (STABLE / worst).powi(2);
+                format!("the explicit force would need a fluid step of at most {step:.1e} s")
+            })
+        }
+        _ => None,
     }
 }

@@ -5,6 +5,7 @@
 //! accuracy, off below a third of it. Depends on the exchange and the one before alone, in an order that does not know
 //! ranks and threads, so any split of a run decides alike. A replay follows what was recorded. Logs nothing itself.
 
+use super::start::barred;
 use super::{FEEDBACK, MODEL, SWITCHES, Switch, live, on, set, setting};
 use crate::config::{AddedMass, CaseFile, Config, Feedback, Model};
 use crate::forces::{self, Extra, lift};
@@ -39,7 +40,7 @@ impl fmt::Display for Change {
         if self.done {
             write!(f, "{} from the next exchange on: {size} {asked}", self.setting)
         } else {
-            write!(f, "missing: {size} {asked}; it would need {} from the start", self.setting)
+            write!(f, "missing: {size} {asked}; {}", self.setting)
         }
     }
 }
@@ -117,7 +118,7 @@ impl Watch {
                         list.push(self.change(t, setting(s.key, wanted), true));
                     }
                 }
-                None => list.extend(self.missing(t, switch)),
+                None => list.extend(self.missing(t, switch, &scene)),
             }
         }
         list
@@ -138,7 +139,7 @@ impl Watch {
     }
 
     /// A term that is off, would be on, and was not left out by the user: said once.
-    fn missing(&mut self, t: &Term, switch: Option<&Switch>) -> Option<Change> {
+    fn missing(&mut self, t: &Term, switch: Option<&Switch>, scene: &Scene) -> Option<Change> {
         let (key, setting) = needed(&self.config.file, t.name, switch)?;
         let kept = self.config.file.auto.as_ref().is_some_and(|a| a.keep.iter().any(|k| k == key));
         let large = t.relative > self.accuracy;
@@ -146,7 +147,9 @@ impl Watch {
             return None;
         }
         self.told.push(t.name);
-        Some(self.change(t, setting, false))
+        // what the case cannot have is not advised
+        let why = barred(&self.config, key, scene);
+        Some(self.change(t, why.unwrap_or_else(|| format!("it would need {setting} from the start")), false))
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::record::{fail, of_file};
 use super::{BAD_INPUT, FAILED, OK, print, read};
-use crate::config::{Config, Problem};
+use crate::config::{Config, Feedback, Problem};
 use crate::inspect::{Scene, expected, recorded};
 use crate::locate::Locator;
 use crate::monitor;
@@ -135,7 +135,21 @@ struct Found {
 }
 
 fn of_case(path: &Path) -> Result<Found, u8> {
-    let (config, _) = read(path, &[])?;
+    let (mut config, _) = read(path, &[])?;
+    // as it ran, with overrides and what `auto` chose
+    let resolved = path.join("logs/case.resolved.toml");
+    if let Ok(text) = std::fs::read_to_string(&resolved) {
+        config.file = toml::from_str(&text).map_err(|e| {
+            let fix = format!("voidage run {}", path.display());
+            print(&[Problem::error(
+                &resolved.display().to_string(),
+                e.message(),
+                "the settings of a run",
+                &fix,
+            )]);
+            BAD_INPUT
+        })?;
+    }
     let file = path.join("monitor.csv");
     let rows = monitor::read(&file).map_err(|e| {
         let fix = format!("voidage run {}", path.display());
@@ -151,10 +165,18 @@ fn of_recording(path: &Path) -> Result<Found, u8> {
     let told = |e: RecordError| of_file(path, e);
     let mut m = Moments::new(reader).map_err(told)?;
     let scene = recorded::scene(&mut m, &config).map_err(told)?;
-    let at = m.exchanges.len().saturating_sub(1);
-    let last = m.at(at).map_err(told)?;
+    // the last one may be cut
+    let mut last = None;
+    for at in (0..m.exchanges.len()).rev() {
+        last = m.at(at).map_err(told)?;
+        if last.is_some() {
+            break;
+        }
+    }
+    // without feedback the fluid is told of no solids
+    let two_way = config.file.coupling.feedback == Feedback::TwoWay;
     let mut slices = None;
-    if let Some(x) = last {
+    if let Some(x) = last.filter(|_| two_way) {
         let voidage = x.sources(&m.mesh).map_err(told)?.voidage;
         let solid: Vec<f64> = voidage.iter().map(|e| 1.0 - e).collect();
         let most = solid.iter().copied().fold(0.0, f64::max);

@@ -3,6 +3,7 @@
 
 use super::record::{fail, of_file};
 use super::{BAD_INPUT, FAILED, OK, overrides, print};
+use crate::auto;
 use crate::config::Problem;
 use crate::inspect::recorded;
 use crate::record::moment::Moments;
@@ -91,14 +92,19 @@ pub fn stability(path: &Path, o: &Options) -> u8 {
     let tau_p = if scales.relaxation.is_empty() { scales.stokes_time() } else { scales.relaxation.mean };
     let tau_f = scales.fluid_relaxation.unwrap_or(tau_p);
     let (low, high) = (0.02 * tau_f.min(config.period()), 1e3 * tau_f.max(config.period()));
+    let first = list[0];
     let mut growths: Vec<Growth> = Vec::new();
     for k in list.iter().copied() {
         let moment = m.exchange(k).and_then(|f| f.ok_or(RecordError::NoExchange));
-        let read = moment.and_then(|f| Ok((f.particles()?, f.fluid(&m.mesh)?)));
-        let (particles, fluid) = match read {
+        let read = moment.and_then(|f| Ok((f.particles()?, f.fluid(&m.mesh)?, f.on)));
+        let (particles, fluid, on) = match read {
             Ok(x) => x,
             Err(e) => return of_file(&path, e),
         };
+        let mut config = config.clone();
+        if let Some(bits) = on {
+            auto::put(&mut config.file, bits);
+        }
         let (config, particles, fluid) = (&config, &particles, &fluid.velocity[..]);
         let scene = Scene { exchange: k, config, mesh: &m.mesh, particles, fluid };
         let done = if growths.is_empty() {
@@ -125,7 +131,7 @@ pub fn stability(path: &Path, o: &Options) -> u8 {
     }
     let list = growths;
     let marks = marks(&scales, config.period());
-    show(&list, &marks, high, config.file.dem.time_step);
+    show(&list, &marks, high, config.file.dem.time_step, first);
     if let Err(e) = write(&list, &marks, o) {
         eprintln!("error: {e}");
         return FAILED;
@@ -158,7 +164,7 @@ fn marks(s: &crate::inspect::Scene, period: f64) -> Vec<(&'static str, f64)> {
     list
 }
 
-fn show(list: &[Growth], marks: &[(&str, f64)], high: f64, dem_step: f64) {
+fn show(list: &[Growth], marks: &[(&str, f64)], high: f64, dem_step: f64, first: i64) {
     println!(
         "largest stable fluid step, s (coupling.interval at this DEM step), by growth per exchange ≤ {NEUTRAL}:"
     );
@@ -167,7 +173,11 @@ fn show(list: &[Growth], marks: &[(&str, f64)], high: f64, dem_step: f64) {
         None => format!("none up to {high:.1e}"),
         Some(t) if t > 0.0 => {
             let most = g.found.iter().map(|f| f.1).fold(t, f64::max);
-            let range = if most > 1.02 * t { format!(" .. {most:.2e}") } else { String::new() };
+            let range = match g.found.first() {
+                Some(f) if f.0 != first => " .. none".into(),
+                _ if most > 1.02 * t => format!(" .. {most:.2e}"),
+                _ => String::new(),
+            };
             format!("{t:.3e}{range} ({})", (t / dem_step).floor())
         }
         Some(_) => format!("below {:.1e}", g.points[0].0),

@@ -63,7 +63,12 @@ pub fn scene<R: Read + Seek>(m: &mut Moments<R>, c: &Config) -> Result<Scene, Re
         list.push(k);
         samples += 1;
         in_force = now.on;
-        one(&mut s, &mut x, m, &now, earlier.as_ref(), c, law, &locator)?;
+        // what `auto` had on in this one
+        let mut c = c.clone();
+        if let Some(bits) = now.on {
+            auto::put(&mut c.file, bits);
+        }
+        one(&mut s, &mut x, m, &now, earlier.as_ref(), &c, law, &locator)?;
     }
     if samples == 0 {
         return Err(RecordError::NoExchange);

@@ -55,7 +55,7 @@ pub fn find(c: &Config, time: Option<f64>) -> Result<Restart, Vec<Problem>> {
         })?,
     };
     let state = State::read(&chosen.1).map_err(|e| {
-        one("restart set", chosen.0.to_string(), &e, "name an older set: --restart=TIME, or start anew")
+        one("restart set", chosen.0.to_string(), &e, "name another set: --restart=TIME, or start anew; sets of another version need that version of voidage")
     })?;
     let restart = Restart { folder: chosen.1.clone(), state };
     let problems = mismatches(c, &restart);

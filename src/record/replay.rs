@@ -159,6 +159,7 @@ impl Start {
         let Some(first) = m.exchanges.len().checked_sub(n.max(1)).filter(|f| *f > 0) else { return Ok(None) };
         let (k, offset) = m.exchanges[first];
         let mut left = None;
+        // without feedback the replies hold no voidage: a running mean of it begins anew
         if m.exchanges[first - 1].0 == k - 1
             && let Some(x) = m.at(first - 1)?
         {

@@ -4,6 +4,7 @@
 //! Reads `Content`; writes text. Every number is shown as it was measured.
 
 use super::{Content, charts, slice};
+use crate::config::Feedback;
 use crate::inspect::decide;
 use crate::monitor::Row;
 use crate::plot::escape;
@@ -155,7 +156,14 @@ fn shares(s: &mut String, rows: &[Row]) {
 
 fn voidage(s: &mut String, c: &Content) -> std::io::Result<()> {
     let Some((k, time, most, slices)) = &c.slices else {
-        *s += "<p>No exchange was recorded: run the case with <code>--set record.last=1</code> to see the voidage.</p>\n";
+        *s += match c.config.file.coupling.feedback {
+            Feedback::TwoWay => {
+                "<p>No exchange was recorded: run the case with <code>--set record.last=1</code> to see the voidage.</p>\n"
+            }
+            Feedback::OneWay => {
+                "<p>The fluid does not feel the particles (one-way): it has no voidage.</p>\n"
+            }
+        };
         return Ok(());
     };
     let _ = writeln!(
@@ -281,7 +289,12 @@ fn stability(s: &mut String, c: &Content) {
     *s += "<table><tr><th>scheme</th><th class=\"n\">largest stable fluid step, particles free, s</th><th class=\"n\">held, s</th></tr>\n";
     let text = |held: bool, name: &str| {
         let g = growths.iter().find(|g| g.held == held && g.scheme == name)?;
-        Some(g.limit.map_or("no limit found".into(), |t| format!("{t:.2e}")))
+        let least = g.points.first().map_or(0.0, |p| p.0);
+        Some(match g.limit {
+            None => "no limit found".into(),
+            Some(t) if t > 0.0 => format!("{t:.2e}"),
+            Some(_) => format!("below {least:.1e}"),
+        })
     };
     for g in growths.iter().filter(|g| !g.held) {
         let free = text(false, g.scheme).unwrap_or_default();

@@ -33,6 +33,8 @@ pub struct Before {
     pub drag_coefficient: f64,
     /// ũ + d − v with the fluid of the previous step, m/s
     pub slip: [f64; 3],
+    /// particle mass, kg
+    pub mass: f64,
     /// particle mass and added mass, kg
     pub inertia: f64,
     /// Δt, s

@@ -30,6 +30,7 @@ fn combine(to: &State, factor: f64, a: &State, b: &State) -> State {
     let (h, x, y) = (&to.history, &a.history, &b.history);
     State {
         fluid: v(&to.fluid, &a.fluid, &b.fluid),
+        before: v(&to.before, &a.before, &b.before),
         velocity: v(&to.velocity, &a.velocity, &b.velocity),
         ledger: v(&to.ledger, &a.ledger, &b.ledger),
         history: History {
@@ -48,6 +49,7 @@ fn blank(s: &State) -> State {
     let h = &s.history;
     State {
         fluid: v(&s.fluid),
+        before: v(&s.before),
         velocity: v(&s.velocity),
         ledger: v(&s.ledger),
         history: History {

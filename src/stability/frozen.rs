@@ -20,6 +20,8 @@ type V = [f64; 3];
 pub struct State {
     /// U of the cells, m/s
     pub fluid: Vec<V>,
+    /// U one step earlier, m/s; empty unless an added mass looks at it
+    pub before: Vec<V>,
     /// v of the particles, m/s
     pub velocity: Vec<V>,
     /// L, N s
@@ -43,6 +45,9 @@ pub struct Frozen {
     gravity: V,
     held: bool,
     history: bool,
+    added: bool,
+    /// the force stays over the interval (`dem.force`)
+    constant: bool,
 }
 
 impl Frozen {
@@ -79,11 +84,25 @@ impl Frozen {
         };
         let inertia = (0..n).map(|i| p.mass[i] + added(i)).collect();
         let (ledger, history) = (p.ledger.clone(), p.history.clone());
-        let state = State { fluid: u.to_vec(), velocity: p.velocity.clone(), ledger, history };
+        let adds = step.extra().added();
+        let before = if adds { u.to_vec() } else { Vec::new() };
+        let state = State { fluid: u.to_vec(), before, velocity: p.velocity.clone(), ledger, history };
         let period = c.period();
         let (gravity, history) = (c.file.fluid.gravity, wants);
-        let mut all =
-            Self { step, particles: p, inertia, voidage, fluid_mass, period, gravity, held, history };
+        let constant = c.file.dem.force == crate::config::InInterval::Constant;
+        let mut all = Self {
+            step,
+            particles: p,
+            inertia,
+            voidage,
+            fluid_mass,
+            period,
+            gravity,
+            held,
+            history,
+            added: adds,
+            constant,
+        };
         // schemes that look back are disturbed around an interval that was
         let state = if wants { all.exchange(&state).map_err(told)? } else { state };
         Ok((all, state))
@@ -97,7 +116,7 @@ impl Frozen {
         if self.history {
             p.history.clone_from(&s.history);
         }
-        self.step.restore(&self.voidage, &s.fluid, &[]);
+        self.step.restore(&self.voidage, &s.fluid, &s.before);
         self.step.before_fluid(p, false)?;
         let q = &self.step.sources;
         let cell = |j: usize| {
@@ -110,6 +129,7 @@ impl Frozen {
         let (p, d, n) = (&self.particles, &self.step.drive, self.particles.len());
         let mut next = State {
             fluid: fluid.velocity,
+            before: if self.added { s.fluid.clone() } else { Vec::new() },
             velocity: p.velocity.clone(),
             ledger: vec![[0.0; 3]; n],
             history: History::default(),
@@ -126,9 +146,11 @@ impl Frozen {
                 if self.held {
                     taken[i][a] = dt * drag;
                 } else {
-                    let change = dt * mean * (drag + weight);
-                    taken[i][a] = change - dt * weight;
-                    next.velocity[i][a] += change / m;
+                    // (m + m_a) dv/dt = drag + weight; what the fluid gave is m Δv − weight, as the fix reports it
+                    let mean = if self.constant { 1.0 } else { mean };
+                    let change = dt * mean * (drag + weight) / m;
+                    taken[i][a] = p.mass[i] * change - dt * weight;
+                    next.velocity[i][a] += change;
                 }
                 next.ledger[i][a] = taken[i][a] - d.charged[i][a];
             }
@@ -148,13 +170,13 @@ impl Frozen {
     /// Momentum that exchanges keep (conservative schemes, free particles): fluid + particles − Σ L, N s.
     pub fn momentum(&self, s: &State) -> V {
         let of = |m: &[f64], u: &[V]| sum3(m.iter().zip(u).map(|(m, u)| u.map(|u| m * u)));
-        let (fluid, particles) = (of(&self.fluid_mass, &s.fluid), of(&self.inertia, &s.velocity));
+        let (fluid, particles) = (of(&self.fluid_mass, &s.fluid), of(&self.particles.mass, &s.velocity));
         let ledger = sum3(s.ledger.iter().copied());
         [0, 1, 2].map(|a| fluid[a] + particles[a] - ledger[a])
     }
     /// Mass of fluid and particles, kg.
     pub fn mass(&self) -> f64 {
-        crate::sums::sum(self.fluid_mass.iter().chain(&self.inertia).copied())
+        crate::sums::sum(self.fluid_mass.iter().chain(&self.particles.mass).copied())
     }
     /// √(Σ m |u|² + Σ |L|²/m), √J: the size of a state.
     pub fn size(&self, s: &State) -> f64 {

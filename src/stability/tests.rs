@@ -122,3 +122,27 @@ fn conservative_bears_all() {
         assert!(s.contains("conservative") && s.contains("tau_f"));
     }
 }
+
+#[test]
+fn an_exchange_keeps_momentum_with_added_mass_too() {
+    let (mut config, mesh, particles, mut fluid) = scene();
+    config.file.fluid.gravity = [0.0, -9.81, 0.0];
+    fluid.iter_mut().enumerate().for_each(|(j, u)| u[1] = 0.1 * (j as f64).sin());
+    for added in [0.0, 0.5] {
+        config.file.forces.added_mass = crate::config::AddedMass::Coefficient(added);
+        for scheme in ["conservative", "conservative-adaptive", "explicit"] {
+            config.file.coupling.scheme = scheme.into();
+            let (mut f, base) = Frozen::new(&config, mesh.clone(), particles.clone(), &fluid, false).unwrap();
+            // U of the step before differs, so the fluid accelerates
+            let one = f.exchange(&base).unwrap();
+            let two = f.exchange(&one).unwrap();
+            // less Archimedes' force, which has no reaction
+            let weight = particles.mass.iter().sum::<f64>() * -9.81 * config.period() * (1.0 - 1.2 / 1000.0);
+            let size = weight.abs() + crate::sums::norm(f.momentum(&one));
+            let change = [0, 1, 2].map(|a| f.momentum(&two)[a] - f.momentum(&one)[a]);
+            for (a, due) in [0.0, weight, 0.0].into_iter().enumerate() {
+                assert!((change[a] - due).abs() < 1e-13 * size, "{scheme} {added}: {change:?}, {weight}");
+            }
+        }
+    }
+}

@@ -125,10 +125,12 @@ impl CouplingStep {
             let parcel = ratio * ratio * ratio;
             let share = if s.model_b { parcel / b.slips[k].voidage } else { parcel };
             let v = p.velocity[i];
-            let inertia = p.mass[i] + self.added_mass(p, i, 1.0 - b.slips[k].voidage);
-            let last = p.history.last(i, v, inertia, s.gravity, s.period);
+            let mass = p.mass[i];
+            let inertia = mass + self.added_mass(p, i, 1.0 - b.slips[k].voidage);
+            let last = p.history.last(i, v, mass, s.gravity, s.period);
             let drag_coefficient = b.drag[k] * share;
-            let before = Before { drag_coefficient, slip: b.vectors[k], inertia, period: s.period, last };
+            let before =
+                Before { drag_coefficient, slip: b.vectors[k], mass, inertia, period: s.period, last };
             out.set(at + k, &Predicted::new(s.scheme, &before, b.defects[k], b.gathered[k]));
         }
     }

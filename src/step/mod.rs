@@ -4,7 +4,7 @@
 //! `before_fluid`: particles of exchange k in, voidage and sources of fluid step k out (stages 2 to 7).
 //! `after_fluid`: the fluid's answer in, what drives the particles out (stage 9).
 //! Units SI. Does not know processes or files; times the stages; owns scratch memory and nothing that changes
-//! results, except the last fluid velocity, which is part of the exchange.
+//! results, except what `carried` tells and the forces in force, which are part of the exchange.
 
 mod drag;
 mod reply;

@@ -10,7 +10,7 @@ use crate::scheme::Scheme;
 use crate::smooth::TimeAverage;
 use thiserror::Error;
 
-/// What is computed and how; fixed for a run.
+/// What is computed and how; fixed for a run, but for the forces that `auto` switches.
 pub struct Setup {
     /// type-A drag law
     pub drag: &'static dyn DragLaw,
