@@ -174,10 +174,16 @@ impl Particles {
         Ok(p)
     }
 
-    /// Brings the table into the order of `list`, places in it as it is.
-    pub fn arrange(&mut self, list: &[u32], spare: &mut Spare) {
-        let h = &mut self.history;
+    /// Brings the table into the order of `list`, places in it as it is; `told` gets the ids in it, meanwhile.
+    pub fn arrange(&mut self, list: &[u32], spare: &mut Spare, told: impl FnOnce(&[i64]) + Send) {
         permute(&mut self.id, list, &mut spare.ids);
+        let ids = std::mem::take(&mut self.id);
+        threads::both(|| told(&ids), || self.arrange_rest(list, spare));
+        self.id = ids;
+    }
+
+    fn arrange_rest(&mut self, list: &[u32], spare: &mut Spare) {
+        let h = &mut self.history;
         permute(&mut self.origin, list, &mut spare.origins);
         permute(&mut self.asked.kind, list, &mut spare.ids);
         permute(&mut self.asked.spin, list, &mut spare.vectors);

@@ -40,6 +40,15 @@ pub fn map<T: Send, R: Send>(parts: Vec<T>, f: impl Fn(T) -> R + Sync) -> Vec<R>
     parts.into_par_iter().map(&f).collect()
 }
 
+/// Both, at the same time if there are threads.
+pub fn both(a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
+    if count() == 1 {
+        a();
+        return b();
+    }
+    rayon::join(a, b);
+}
+
 /// `slice` cut at `ends` (ascending); an empty one into empty parts.
 pub fn cut<T>(mut slice: &mut [T], ends: impl IntoIterator<Item = usize>) -> Vec<&mut [T]> {
     let (mut at, none) = (0, slice.is_empty());

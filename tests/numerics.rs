@@ -595,7 +595,7 @@ fn bits_on(threads: usize, backwards: bool, mapping: &str) -> Bits {
     let mut p = scene::bed(scene::BOX, 20_000, scene::DIAMETER);
     if backwards {
         let list: Vec<u32> = (0..p.len() as u32).rev().collect();
-        p.arrange(&list, &mut voidage::particles::Spare::default());
+        p.arrange(&list, &mut voidage::particles::Spare::default(), |_| {});
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     for first in [true, false] {

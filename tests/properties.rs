@@ -218,7 +218,7 @@ proptest! {
         locate::Locator::new(&mesh).locate(&mesh, &mut p.position, &mut host).unwrap();
         let mut order = Order::default();
         let list = order.update(mesh.len(), &p.id, &host);
-        p.arrange(list, &mut Spare::default());
+        p.arrange(list, &mut Spare::default(), |_| {});
         host = list.iter().map(|i| host[*i as usize]).collect();
         for mapping in map::all().iter_mut().filter(|m| m.conservative()) {
             let mut w = Weights::default();

@@ -64,6 +64,8 @@ pub struct CouplingStep {
     places: Places,
     /// while locating: hosts of the last exchange, in its order
     last_hosts: Vec<u32>,
+    /// ids of the last exchange, in its order
+    last_ids: Vec<i64>,
     /// the fluid of the last step as it came, m/s
     fluid_velocity: Vec<[f64; 3]>,
     /// lanes 0–2 G of the new fluid's velocity, 3–5 of its ∇p − ∇·τ
@@ -131,6 +133,7 @@ impl CouplingStep {
             spare: Spare::default(),
             places: Places::default(),
             last_hosts: Vec::new(),
+            last_ids: Vec::new(),
             fluid_velocity: vec![[0.0; 3]; n],
             gathered: Field::zero(n),
             work: Field::zero(n),
@@ -317,7 +320,12 @@ impl CouplingStep {
         let begin = Instant::now();
         std::mem::swap(&mut self.hosts, &mut self.last_hosts);
         self.hosts.clear();
-        let guess = p.id.iter().map(|id| self.last_hosts.get(self.places.of(*id) as usize).copied());
+        // as a rule a particle comes where it was; only others are looked up
+        let place = |(k, id): (usize, &i64)| match self.last_ids.get(k) {
+            Some(last) if last == id => k,
+            _ => self.places.of(*id) as usize,
+        };
+        let guess = p.id.iter().enumerate().map(|p| self.last_hosts.get(place(p)).copied());
         self.hosts.extend(guess.map(|g| g.unwrap_or(NONE)));
         let lost =
             self.locator.locate(&self.mesh, &mut p.position, &mut self.hosts).err().unwrap_or_default();
@@ -338,11 +346,12 @@ impl CouplingStep {
             &self.hosts
         };
         let list = self.order.update(self.classes.rows(), &p.id, rows);
-        p.arrange(list, &mut self.spare);
+        let (spare, places) = (&mut self.spare, &mut self.places);
+        p.arrange(list, spare, |ids| places.update(ids));
+        self.last_ids.clone_from(&p.id);
         self.last_hosts.clear();
         self.last_hosts.extend(list.iter().map(|i| self.hosts[*i as usize]));
         std::mem::swap(&mut self.hosts, &mut self.last_hosts);
-        self.places.update(&p.id);
         self.seconds.locate = (located - begin).as_secs_f64();
         self.seconds.arrange = located.elapsed().as_secs_f64();
         Ok(())
