@@ -205,7 +205,7 @@ impl Choosing<'_> {
             return self.row(s.term, "given", format!("{} = {value}", s.key), "");
         }
         let wanted = decide::hysteresis(on(f, s.key), relative, self.auto.accuracy);
-        if let Some(why) = barred(self.c, s.key, &self.scene) {
+        if let Some(why) = barred(self.c, s.key, self.scene) {
             set(&mut self.c.file.forces, s.key, false);
             let choice = if wanted { "missing" } else { "off" };
             return self.row(s.term, choice, setting(s.key, false), if wanted { &why } else { "" });

@@ -10,7 +10,7 @@ use crate::monitor;
 use crate::record::moment::Moments;
 use crate::record::{Reader, RecordError, replay};
 use crate::report::slice::{Slice, slice};
-use crate::report::{Content, charts, html};
+use crate::report::{Content, Stability, charts, html};
 use crate::scheme;
 use crate::stability::Growth;
 use serde_json::Value;
@@ -109,8 +109,7 @@ fn json(file: Option<&Path>) -> Result<Option<Value>, Problem> {
 }
 
 /// Growths and time scales of `voidage stability --json`.
-#[allow(clippy::type_complexity)] // as in `Content`
-fn growths(v: &Value) -> Option<(Vec<Growth>, Vec<(String, f64)>)> {
+fn growths(v: &Value) -> Option<Stability> {
     let point = |p: &Value| Some((p.get(0)?.as_f64()?, p.get(1)?.as_f64().unwrap_or(f64::INFINITY)));
     let one = |g: &Value| {
         Some(Growth {

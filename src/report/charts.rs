@@ -48,7 +48,7 @@ fn tuning(points: &[Value]) -> String {
     }
     // one smoother at several tolerances is a curve; what was measured once is in the table
     curves.retain(|c| c.points.len() > 2);
-    curves.sort_by(|a, b| b.points.len().cmp(&a.points.len()));
+    curves.sort_by_key(|c| std::cmp::Reverse(c.points.len()));
     curves.truncate(8);
     curves.iter_mut().for_each(|c| c.points.sort_by(|a, b| a.0.total_cmp(&b.0)));
     Chart {

@@ -15,6 +15,9 @@ use crate::monitor::Row;
 use crate::stability::Growth;
 use slice::Slice;
 
+/// Growth by scheme, and named time scales (s).
+pub type Stability = (Vec<Growth>, Vec<(String, f64)>);
+
 /// Everything the page tells.
 pub struct Content<'a> {
     /// name of the run
@@ -29,8 +32,8 @@ pub struct Content<'a> {
     pub scene: Option<(Scene, f64)>,
     /// exchange, time (s), largest solid fraction, pictures
     pub slices: Option<(i64, f64, f64, Vec<Slice>)>,
-    /// growth by scheme and named time scales (s)
-    pub stability: Option<(Vec<Growth>, Vec<(String, f64)>)>,
+    /// what `voidage stability` found
+    pub stability: Option<Stability>,
     /// what `voidage tune` wrote
     pub tune: Option<serde_json::Value>,
 }
