@@ -87,6 +87,10 @@ impl Scale {
         let f = |x: f64| if self.logarithmic { x.log10() } else { x };
         (f(v) - f(self.low)) / (f(self.high) - f(self.low))
     }
+    /// A tick's number.
+    fn label(&self, v: f64) -> String {
+        if self.logarithmic && v != 1.0 { format!("1e{}", v.log10().round()) } else { Self::text(v) }
+    }
     fn text(v: f64) -> String {
         let short = format!("{v:.4}");
         let short = short.trim_end_matches('0').trim_end_matches('.');
@@ -128,7 +132,7 @@ impl Chart {
                 s,
                 "<path d=\"M{p:.1} {TOP}V{bottom}\" stroke=\"#ddd\"/><text x=\"{p:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
                 bottom + 15.0,
-                Scale::text(*t)
+                x.label(*t)
             );
         }
         for t in &y.ticks {
@@ -138,7 +142,7 @@ impl Chart {
                 "<path d=\"M{LEFT} {p:.1}H{right}\" stroke=\"#ddd\"/><text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
                 LEFT - 5.0,
                 p + 4.0,
-                Scale::text(*t)
+                y.label(*t)
             );
         }
         let _ = writeln!(

@@ -4,11 +4,12 @@
 
 mod common;
 
+use common::folder::Scratch;
 use common::folder::{copy, root};
 use common::partners::{case, record};
 use std::collections::BTreeMap;
 use std::io::Cursor;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use voidage::auto::{self, Plan, Watch};
 use voidage::config::{self, Compression, Config, Feedback, Model};
 use voidage::inspect::decide::{Choice, choose, hysteresis};
@@ -19,22 +20,6 @@ use voidage::mesh::NONE;
 use voidage::record::Reader;
 use voidage::record::moment::Moments;
 use voidage::record::replay::{Options, Outcome, replay};
-
-/// A path in the scratch folder, removed at the end.
-struct Scratch(PathBuf);
-impl Scratch {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("voidage-auto-{name}-{}", std::process::id()));
-        let _ = std::fs::remove_file(&path);
-        Self(path)
-    }
-}
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.0);
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
 
 fn pairs(set: &[(&str, &str)]) -> Vec<(String, String)> {
     set.iter().map(|(k, v)| ((*k).to_string(), (*v).to_string())).collect()
@@ -96,7 +81,7 @@ fn jet(folder: &Path) {
 fn four_scenes_are_modelled_differently() {
     let cases = root().join("cases");
     let ask = &[("auto.accuracy", "3e-2")];
-    let folder = Scratch::new("jet");
+    let folder = Scratch::new("auto-jet");
     jet(&folder.0);
     let (sphere, s) = chosen(&cases.join("settling"), ask);
     let (jet, j) = chosen(&folder.0, ask);
@@ -192,7 +177,7 @@ fn between_a_third_of_the_accuracy_and_the_accuracy_nothing_changes() {
 
 /// A recorded run of 9 exchanges, in which all three forces may be switched; `start`: those on from the start.
 fn run(name: &str, set: &[(&str, &str)], start: &[&str], ranks: [usize; 2]) -> Vec<u8> {
-    let s = Scratch::new(name);
+    let s = Scratch::new(&format!("auto-{name}"));
     let mut c = case(set, 9);
     c.file.auto.as_mut().unwrap().live = auto::SWITCHES.iter().map(|s| s.key.into()).collect();
     start.iter().for_each(|key| auto::set(&mut c.file.forces, key, true));
@@ -284,7 +269,7 @@ fn forces_are_switched_during_a_run_alike_on_any_ranks_and_replayed_to_the_bit()
     let force = &o.comparison.arrays[&voidage_wire::field::FORCE];
     assert!(o.comparison.alone.is_empty() && force.differing > 0, "{}", o.comparison);
     // a replay that is recorded holds the choices too
-    let s = Scratch::new("saved");
+    let s = Scratch::new("auto-saved");
     again(&gaps, &[], Some(&s.0));
     assert_eq!(in_force(&std::fs::read(&s.0).unwrap()), other);
 }
@@ -294,7 +279,7 @@ fn what_cannot_be_switched_is_told_once() {
     let mut c =
         case(&[("auto.accuracy", "1e-4"), ("coupling.model", "B"), ("coupling.feedback", "one-way")], 9);
     (c.file.forces.pressure_gradient, c.file.forces.viscous_stress) = (false, false);
-    let s = Scratch::new("missing");
+    let s = Scratch::new("auto-missing");
     record(&s.0, &case(&[("record.first", "2")], 9), 9, [1, 1], Compression::Lz4);
     let told = |c: &Config| {
         let mut m = moments(&std::fs::read(&s.0).unwrap());
@@ -375,7 +360,7 @@ fn forces(bytes: &[u8]) -> (Vec<[f64; 3]>, f64) {
 #[test]
 fn replies_stay_within_the_accuracy_against_everything_on() {
     let everything = [("forces.lift", "loth"), ("forces.added_mass", "0.5"), ("forces.history", "true")];
-    let s = Scratch::new("everything");
+    let s = Scratch::new("auto-everything");
     let c = case(&[&everything[..], &[("record.every", "1")]].concat(), 9);
     record(&s.0, &c, 9, [1, 1], Compression::Lz4);
     let full = std::fs::read(&s.0).unwrap();
@@ -397,7 +382,7 @@ fn replies_stay_within_the_accuracy_against_everything_on() {
             })
             .collect();
         let set: Vec<_> = off.iter().map(|(k, v)| (*k, &**v)).collect();
-        let saved = Scratch::new("choice");
+        let saved = Scratch::new("auto-choice");
         again(&full, &set, Some(&saved.0));
         let (got, _) = forces(&std::fs::read(&saved.0).unwrap());
         let square: f64 =

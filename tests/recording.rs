@@ -3,6 +3,7 @@
 
 mod common;
 
+use common::folder::Scratch;
 use common::partners::{case, record, record_in};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -15,28 +16,10 @@ use voidage::record::moment::Moments;
 use voidage::record::replay::{Options, Outcome, ReplayError, replay};
 use voidage::record::{End, Reader, RecordError, forecast};
 
-/// A file in a scratch folder, removed at the end.
-struct Scratch(PathBuf);
-impl Scratch {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("voidage-recording-{name}-{}", std::process::id()));
-        let _ = std::fs::remove_file(&path);
-        Self(path)
-    }
-    fn bytes(&self) -> Vec<u8> {
-        std::fs::read(&self.0).unwrap()
-    }
-}
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.0);
-    }
-}
-
 type Bytes = Cursor<Vec<u8>>;
 
 fn recorded(name: &str, set: &[(&str, &str)], steps: i64, ranks: [usize; 2]) -> Vec<u8> {
-    let s = Scratch::new(name);
+    let s = Scratch::new(&format!("recording-{name}"));
     record(&s.0, &case(set, steps), steps, ranks, Compression::Lz4);
     s.bytes()
 }
@@ -88,7 +71,7 @@ fn other_settings_are_replayed_and_their_difference_is_told() {
     let e = o.comparison.arrays[&voidage_wire::field::VOIDAGE].relative();
     assert!(e > 1e-9 && e < 1e-2, "{}", o.comparison);
     // the replay, saved, is a recording whose replies are those of the other settings
-    let s = Scratch::new("saved");
+    let s = Scratch::new("recording-saved");
     let overrides = vec![("smooth.method".to_string(), "direct".to_string())];
     let save = Some((s.0.as_path(), Compression::None));
     let options = Options { overrides: &overrides, reference: None, save };
@@ -391,7 +374,7 @@ fn a_recording_is_exported_as_series_and_tables() {
 fn the_forecast_bounds_the_size() {
     for set in [ALL, &[("record.every", "4"), ("coupling.scheme", "conservative-adaptive")]] {
         let c = case(set, 9);
-        let s = Scratch::new("forecast");
+        let s = Scratch::new("recording-forecast");
         record(&s.0, &c, 9, [1, 1], Compression::None);
         let size = s.bytes().len() as f64;
         let mut f = forecast::of(&c, 500, 250);
@@ -405,9 +388,9 @@ fn the_forecast_bounds_the_size() {
 
 #[test]
 fn commands_say_what_is_wrong_with_a_file() {
-    let good = Scratch::new("commands");
+    let good = Scratch::new("recording-commands");
     record(&good.0, &case(&[("record.first", "2")], 3), 3, [1, 1], Compression::Lz4);
-    let bad = Scratch::new("commands-bad");
+    let bad = Scratch::new("recording-commands-bad");
     let mut bytes = good.bytes();
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;

@@ -142,6 +142,11 @@ fn sets_that_do_not_match_are_refused() {
     assert_eq!(sets(&c.0).iter().map(|s| s.0).collect::<Vec<_>>(), [0.002, 0.004]);
     let bad = c.try_run(&["--restart=0.003"]);
     assert!(String::from_utf8_lossy(&bad.stderr).contains("there are sets of t = 0.002, 0.004"));
+    c.refused(
+        &["--set", "forces.history=true"],
+        2,
+        &["forces = ", "0 numbers for the history force", "[auto]"],
+    );
     c.refused(&["--set", "run.cfd_ranks=2"], 2, &["the fluid's fields of this set lie on 1 ranks"]);
     c.refused(&["--into", "/tmp/nowhere"], 2, &["leave --into out"]);
     let (_, set) = c.newest();

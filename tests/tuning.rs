@@ -3,9 +3,9 @@
 
 mod common;
 
+use common::folder::Scratch;
 use common::partners::{case, record};
 use std::io::Cursor;
-use std::path::PathBuf;
 use voidage::config::Compression;
 use voidage::record::Reader;
 use voidage::record::compare::Replies;
@@ -16,21 +16,8 @@ use voidage::{map, smooth};
 
 type Bytes = Cursor<Vec<u8>>;
 
-/// A scratch file, removed at the end.
-struct Scratch(PathBuf);
-impl Scratch {
-    fn new(name: &str) -> Self {
-        Self(std::env::temp_dir().join(format!("voidage-tuning-{name}-{}", std::process::id())))
-    }
-}
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.0);
-    }
-}
-
 fn recorded(name: &str, set: &[(&str, &str)], steps: i64) -> Vec<u8> {
-    let s = Scratch::new(name);
+    let s = Scratch::new(&format!("tuning-{name}"));
     record(&s.0, &case(set, steps), steps, [2, 2], Compression::None);
     std::fs::read(&s.0).unwrap()
 }
@@ -57,7 +44,7 @@ fn overrides(section: &str) -> Vec<(String, String)> {
 
 /// The replay with these settings, recorded.
 fn saved(name: &str, bytes: &[u8], set: &[(String, String)]) -> Vec<u8> {
-    let s = Scratch::new(name);
+    let s = Scratch::new(&format!("tuning-{name}"));
     let _ = std::fs::remove_file(&s.0);
     let options = Options { overrides: set, reference: None, save: Some((&s.0, Compression::None)) };
     replay(open(bytes), options, &mut |_| {}).unwrap();
@@ -174,8 +161,11 @@ fn a_replay_from_the_middle_has_the_bits_of_the_run() {
 
 #[test]
 fn the_command_writes_the_section_and_says_what_is_wrong() {
-    let (file, section, json) =
-        (Scratch::new("command"), Scratch::new("command.toml"), Scratch::new("command.json"));
+    let (file, section, json) = (
+        Scratch::new("tuning-command"),
+        Scratch::new("tuning-command.toml"),
+        Scratch::new("tuning-command.json"),
+    );
     record(&file.0, &case(&[("record.last", "3")], 4), 4, [1, 1], Compression::Lz4);
     let name = file.0.display().to_string();
     let run = |more: &[&str]| {

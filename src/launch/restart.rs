@@ -2,7 +2,7 @@
 //! `voidage run --restart`: finds a set and refuses what does not fit together, before anything starts.
 
 use crate::config::{Config, Problem, script};
-use crate::output::restart::{PARTICLES, State, folder, sets};
+use crate::output::restart::{PARTICLES, State, folder, kept, sets};
 use std::path::{Path, PathBuf};
 
 /// A set to continue from.
@@ -75,6 +75,14 @@ fn mismatches(c: &Config, r: &Restart) -> Vec<Problem> {
         let given = format!("{} steps of {:e} s", f.coupling.interval, f.dem.time_step);
         let fix = "continue with the same steps, or start anew from the particles";
         p.push(Problem::error("coupling.interval, dem.time_step", given, &accepted, fix));
+    }
+    let now = kept(c);
+    if now != s.kept {
+        let text =
+            |k: [f64; 2]| format!("{} numbers for the history force, {} for the added mass", k[0], k[1]);
+        let accepted = format!("the particles of this set keep {} each", text(s.kept));
+        let fix = "continue with the same forces.history, forces.added_mass and [auto], or start anew";
+        p.push(Problem::error("forces", text(now), &accepted, fix));
     }
     if s.cfd_ranks != f.run.cfd_ranks {
         let accepted = format!("the fluid's fields of this set lie on {} ranks", s.cfd_ranks);

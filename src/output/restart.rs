@@ -37,6 +37,8 @@ pub struct State {
     pub dem_time_step: f64,
     pub interval: u32,
     pub cfd_ranks: u32,
+    /// numbers per particle in the DEM's file for the history force, and whether there is one for the added mass
+    pub kept: [f64; 2],
     pub particles: usize,
     /// checksum of what the DEM sent in this exchange
     pub particles_sum: String,
@@ -191,6 +193,12 @@ impl State {
     }
 }
 
+/// `State::kept` of a case.
+pub fn kept(c: &Config) -> [f64; 2] {
+    let told = crate::setup::welcome(c, None).settings;
+    ["drive.memory", "drive.added_mass"].map(|key| told.get(key).copied().unwrap_or(0.0))
+}
+
 /// Folder of all sets of a case.
 pub fn folder(case: &Path) -> PathBuf {
     case.join("voidage/restart")
@@ -223,6 +231,7 @@ impl Sets {
             dem_time_step: f.dem.time_step,
             interval: f.coupling.interval,
             cfd_ranks: f.run.cfd_ranks,
+            kept: kept(c),
             ..State::default()
         };
         (f.output.restarts > 0).then(|| Self {
@@ -262,6 +271,7 @@ impl Sets {
         let size = fs::metadata(whole.join(PARTICLES))?.len();
         let (h, mut state) = (&self.head, state);
         (state.dem_time_step, state.interval, state.cfd_ranks) = (h.dem_time_step, h.interval, h.cfd_ranks);
+        state.kept = h.kept;
         state.particles_file = size;
         let part = whole.join("coupler.part");
         fs::write(&part, state.encode().map_err(io::Error::other)?)?;

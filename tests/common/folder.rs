@@ -41,3 +41,27 @@ impl Drop for Folder {
         let _ = std::fs::remove_dir_all(&self.0);
     }
 }
+
+/// The name of a scratch file (or folder), removed at the end.
+pub struct Scratch(pub PathBuf);
+impl Scratch {
+    /// There is nothing of that name yet.
+    pub fn new(name: &str) -> Self {
+        let s = Self(std::env::temp_dir().join(format!("voidage-{name}-{}", std::process::id())));
+        s.remove();
+        s
+    }
+    fn remove(&self) {
+        let _ = std::fs::remove_file(&self.0);
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+    /// What was written.
+    pub fn bytes(&self) -> Vec<u8> {
+        std::fs::read(&self.0).unwrap()
+    }
+}
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        self.remove();
+    }
+}
