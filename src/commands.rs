@@ -325,6 +325,23 @@ pub fn explain(topic: &str) -> u8 {
     OK
 }
 
+/// All numbers as JSON; says why not.
+fn json_text(numbers: &impl serde::Serialize) -> Option<String> {
+    match serde_json::to_string_pretty(numbers) {
+        Ok(t) => Some(t + "\n"),
+        Err(e) => {
+            eprintln!("error: --json: {e}");
+            None
+        }
+    }
+}
+
+/// Writes the file that an option names; says why not.
+fn write(option: &str, file: &Path, text: String) -> bool {
+    let done = std::fs::write(file, text);
+    done.map_err(|e| eprintln!("error: {option} {}: {e}", file.display())).is_ok()
+}
+
 /// `voidage bench`
 pub fn bench(json: Option<&Path>, plot: Option<&Path>, quick: bool) -> u8 {
     let report = match crate::bench::report::run(quick, |what| eprintln!("{what}")) {
@@ -335,17 +352,7 @@ pub fn bench(json: Option<&Path>, plot: Option<&Path>, quick: bool) -> u8 {
         }
     };
     println!("{}", report.table());
-    let write = |option: &str, file: &Path, text: String| {
-        let done = std::fs::write(file, text);
-        done.map_err(|e| eprintln!("error: {option} {}: {e}", file.display())).is_ok()
-    };
-    let text = match serde_json::to_string_pretty(&report) {
-        Ok(t) => t + "\n",
-        Err(e) => {
-            eprintln!("error: --json: {e}");
-            return FAILED;
-        }
-    };
+    let Some(text) = json_text(&report) else { return FAILED };
     let written = json.is_none_or(|file| write("--json", file, text))
         & plot.is_none_or(|file| write("--plot", file, report.plot()));
     if written { OK } else { FAILED }

@@ -9,7 +9,7 @@ const SIZE: [f64; 2] = [560.0, 340.0];
 const LEFT: f64 = 64.0;
 const TOP: f64 = 40.0;
 /// Told apart by eyes that see colours differently (Okabe & Ito).
-const COLOURS: [&str; 8] =
+pub const COLOURS: [&str; 8] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#999999"];
 
 /// One axis.

@@ -25,7 +25,7 @@ pub fn extra(c: &Config) -> forces::Extra {
     forces::Extra {
         ratio: f.dem.coarse_graining.of_all(),
         ratio_by_type: f.dem.coarse_graining.by_type(),
-        lift: forces::lift::all().iter().copied().find(|l| l.name() == x.lift),
+        lift: forces::lift::by_name(&x.lift),
         added_mass: x.added_mass.coefficient(),
         felderhof: x.added_mass.law(),
         history: x.history,

@@ -7,15 +7,12 @@
 //! arrays are exchanged, and it can be switched on.
 
 use super::{FEEDBACK, HISTORY, LIFT, MODEL, SMOOTHING, SWITCHES, Switch, on, set, setting};
-use crate::config::{Auto, Config, Feedback, Flow, InInterval, Model, Problem};
-use crate::forces::history::explicit_ratio;
+use crate::config::{Auto, Config, Feedback, Flow, InInterval, Model, Problem, resolution};
 use crate::inspect::{Scene, decide, expected};
 use std::fmt;
 
 /// What is estimated may be so much larger.
 const MARGIN: f64 = 10.0;
-/// Largest answer of the explicit history force to a change of slip (`explicit_ratio`); it is stable below 1.
-const STABLE: f64 = 0.5;
 
 /// A term and what is made of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -239,21 +236,14 @@ impl Choosing<'_> {
 
 /// Why a force cannot be had in this case.
 pub(super) fn barred(c: &Config, key: &str, scene: &Scene) -> Option<String> {
-    let f = &c.file;
     match key {
-        super::ADDED_MASS if f.dem.force == InInterval::Constant => {
+        super::ADDED_MASS if c.file.dem.force == InInterval::Constant => {
             Some("it would need dem.force = \"implicit\"".into())
         }
         HISTORY => {
-            let (d, rho) = (scene.diameter.mean, scene.density.mean);
-            let ratios = f.dem.coarse_graining.by_type().into_iter();
-            let ratios = ratios.chain([f.dem.coarse_graining.of_all()]).filter(|r| *r >= 1.0);
-            let (nu, period) = (f.fluid.kinematic_viscosity, c.period());
-            let of = |r: f64| explicit_ratio(d / r, f.fluid.density, rho, nu, period);
-            let worst = ratios.map(of).fold(0.0, f64::max);
-            // the newest part goes with the square root of the step
-            (worst > STABLE).then(|| {
-                let step = period * (STABLE / worst).powi(2);
+            let worst = resolution::history_answer(c, scene.diameter.mean, scene.density.mean);
+            (worst > resolution::STABLE).then(|| {
+                let step = resolution::history_step(c, worst);
                 format!("the explicit force would need a fluid step of at most {step:.1e} s")
             })
         }

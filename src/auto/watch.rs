@@ -86,7 +86,7 @@ impl Watch {
     /// Makes a step compute what is in force.
     pub fn apply(&self, extra: &mut Extra) {
         let f = &self.config.file.forces;
-        extra.lift = lift::all().iter().copied().find(|l| l.name() == f.lift);
+        extra.lift = lift::by_name(&f.lift);
         extra.history = f.history;
         if let AddedMass::Coefficient(c) = f.added_mass {
             extra.added_mass = c;

@@ -5,14 +5,13 @@
 //! user gets with the particle centroid; below the deposit's own error nothing is won.
 
 use super::smoother::Cost;
+use crate::plot::COLOURS;
 use std::fmt::Write;
 
 const SIZE: [f64; 2] = [430.0, 360.0];
 const LEFT: f64 = 62.0;
 const TOP: f64 = 46.0;
 const GAP: f64 = 84.0;
-const COLOURS: [&str; 8] =
-    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#999999"];
 
 /// Decades that hold all values.
 fn decades(values: impl Iterator<Item = f64>) -> [i32; 2] {

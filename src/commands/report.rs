@@ -14,7 +14,6 @@ use crate::report::{Content, Stability, charts, html};
 use crate::scheme;
 use crate::stability::Growth;
 use serde_json::Value;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// What is asked of the command.
@@ -163,15 +162,11 @@ fn of_recording(path: &Path) -> Result<Found, u8> {
     let config = replay::case(&reader, &[]).map_err(|e| fail(&e))?;
     let told = |e: RecordError| of_file(path, e);
     let mut m = Moments::new(reader).map_err(told)?;
+    // rows stand between the exchanges
+    while m.next().map_err(told)?.is_some() {}
+    let rows = std::mem::take(&mut m.rows);
     let scene = recorded::scene(&mut m, &config).map_err(told)?;
-    // the last one may be cut
-    let mut last = None;
-    for at in (0..m.exchanges.len()).rev() {
-        last = m.at(at).map_err(told)?;
-        if last.is_some() {
-            break;
-        }
-    }
+    let last = m.last().map_err(told)?;
     // without feedback the fluid is told of no solids
     let two_way = config.file.coupling.feedback == Feedback::TwoWay;
     let mut slices = None;
@@ -187,20 +182,18 @@ fn of_recording(path: &Path) -> Result<Found, u8> {
         })?;
         slices = Some((x.k, x.time, most, all));
     }
-    // rows stand between the exchanges
-    let mut m = Moments::new(Reader::open(path).map_err(told)?).map_err(told)?;
-    while m.next().map_err(told)?.is_some() {}
-    Ok(Found { config, rows: m.rows, scene: Some(scene), slices })
+    Ok(Found { config, rows, scene: Some(scene), slices })
 }
 
 fn write(c: &Content, folder: &Path) -> std::io::Result<()> {
     std::fs::create_dir_all(folder)?;
-    for (name, svg) in charts::all(c) {
+    let pictures = charts::all(c);
+    for (name, svg) in &pictures {
         std::fs::write(folder.join(name).with_extension("svg"), svg)?;
     }
     for s in c.slices.iter().flat_map(|s| &s.3) {
         std::fs::write(folder.join(format!("solid-fraction-{}{}.png", s.axes[0], s.axes[1])), &s.png)?;
     }
-    let page = html::page(c)?;
-    std::io::Write::write_all(&mut File::create(folder.join("report.html"))?, page.as_bytes())
+    let page = html::page(c, &pictures)?;
+    std::fs::write(folder.join("report.html"), page)
 }

@@ -2,7 +2,7 @@
 //! `voidage tune FILE`.
 
 use super::record::{fail, of_file};
-use super::{BAD_INPUT, FAILED, OK, overrides, print};
+use super::{BAD_INPUT, FAILED, OK, json_text, overrides, print, write};
 use crate::config::Problem;
 use crate::record::Reader;
 use crate::record::replay::ReplayError;
@@ -78,17 +78,7 @@ pub fn tune(file: &Path, o: &Options) -> u8 {
     };
     table.all = o.all;
     print!("{}: {table}", file.display());
-    let write = |option: &str, file: &Path, text: String| {
-        let done = std::fs::write(file, text);
-        done.map_err(|e| eprintln!("error: {option} {}: {e}", file.display())).is_ok()
-    };
-    let text = match serde_json::to_string_pretty(&table) {
-        Ok(t) => t + "\n",
-        Err(e) => {
-            eprintln!("error: --json: {e}");
-            return FAILED;
-        }
-    };
+    let Some(text) = json_text(&table) else { return FAILED };
     let mut written = o.json.is_none_or(|to| write("--json", to, text));
     let Some(section) = &table.section else { return FAILED };
     written &= o.write.is_none_or(|to| write("--write", to, section.clone()));

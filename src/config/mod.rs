@@ -9,7 +9,7 @@ mod bandwidth;
 mod check;
 pub mod foam;
 mod raw;
-mod resolution;
+pub(crate) mod resolution;
 pub mod script;
 
 pub use check::{check, settings};

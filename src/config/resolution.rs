@@ -87,27 +87,39 @@ pub fn gather_bias(c: &Config, mesh: &foam::Extent, s: &script::Script, p: &mut 
     }
 }
 
+/// Largest answer of the explicit history force to a change of slip that is wanted; it is stable below 1.
+pub const STABLE: f64 = 0.5;
+
+/// The largest answer of the explicit history force to a change of slip, over all coarse-graining ratios; `diameter` (m) and
+/// `density` (kg/m3) of the particles.
+pub fn history_answer(c: &Config, diameter: f64, density: f64) -> f64 {
+    let f = &c.file.fluid;
+    let of =
+        |ratio: f64| explicit_ratio(diameter / ratio, f.density, density, f.kinematic_viscosity, c.period());
+    let grain = &c.file.dem.coarse_graining;
+    let ratios = grain.by_type().into_iter().chain([grain.of_all()]);
+    ratios.filter(|r| *r >= 1.0).map(of).fold(0.0, f64::max)
+}
+
+/// The fluid step (s) at which an `answer` becomes `STABLE`: the newest part goes with the square root of the step.
+pub fn history_step(c: &Config, answer: f64) -> f64 {
+    c.period() * (STABLE / answer).powi(2)
+}
+
 /// The explicit history force against the particle's inertia.
 pub fn history(c: &Config, radius: f64, density: f64, p: &mut Vec<Problem>) {
     if !c.file.forces.history {
         return;
     }
-    let f = &c.file.fluid;
-    let of = |ratio: f64| {
-        explicit_ratio(2.0 * radius / ratio, f.density, density, f.kinematic_viscosity, c.period())
-    };
-    let ratios =
-        c.file.dem.coarse_graining.by_type().into_iter().chain([c.file.dem.coarse_graining.of_all()]);
-    let worst = ratios.filter(|r| *r >= 1.0).map(of).fold(0.0, f64::max);
-    // the newest part goes with the square root of the step
-    let step = c.period() * (0.5 / worst).powi(2);
+    let worst = history_answer(c, 2.0 * radius, density);
+    let step = history_step(c, worst);
     let accepted = format!(
         "the explicit history force answers a change of slip by {worst:.2} of it a fluid step later; it is stable below 1"
     );
     let fix = format!("a fluid step of at most {step:.1e} s, or forces.history = false");
     if worst >= 1.0 {
         p.push(Problem::error("forces.history", true, &accepted, fix));
-    } else if worst > 0.5 {
+    } else if worst > STABLE {
         p.push(Problem::warning("forces.history", true, &accepted, fix));
     }
 }

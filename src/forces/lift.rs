@@ -36,6 +36,11 @@ pub fn all() -> &'static [&'static dyn Lift] {
     &[&SaffmanMei, &Loth]
 }
 
+/// The law of that name.
+pub fn by_name(name: &str) -> Option<&'static dyn Lift> {
+    all().iter().copied().find(|l| l.name() == name)
+}
+
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

@@ -166,7 +166,7 @@ fn terms(s: &mut Scene, c: &Config, drag: f64, weight: f64, phi: Option<f64>, hi
         kinematic_viscosity: nu,
         density: rho,
     };
-    let law = forces::lift::all().iter().find(|l| l.name() == "loth");
+    let law = forces::lift::by_name("loth");
     put(
         "lift",
         law.map_or(0.0, |l| norm(l.force(&flow)) / scale),

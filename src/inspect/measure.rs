@@ -182,7 +182,7 @@ impl Sums {
             let vorticity = [grad[2][1] - grad[1][2], grad[0][2] - grad[2][0], grad[1][0] - grad[0][1]];
             let shear =
                 lift::Shear { diameter: primary, slip, vorticity, kinematic_viscosity: nu, density: rho };
-            let law = lift::all().iter().find(|l| l.name() == "loth");
+            let law = lift::by_name("loth");
             self.lift.add(law.map_or(0.0, |l| ratio.powi(3) * norm(l.force(&shear))));
             let omega = p.asked.spin.get(i).copied().unwrap_or_default();
             let turn = [0, 1, 2].map(|a| 0.5 * vorticity[a] - omega[a]);

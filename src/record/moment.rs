@@ -249,4 +249,14 @@ impl<R: Read + Seek> Moments<R> {
         (self.open, self.early) = (None, Vec::new());
         self.next()
     }
+
+    /// The last whole exchange: a file may be cut in the last one it has.
+    pub fn last(&mut self) -> Result<Option<Messages>, RecordError> {
+        for n in (0..self.exchanges.len()).rev() {
+            if let Some(x) = self.at(n)? {
+                return Ok(Some(x));
+            }
+        }
+        Ok(None)
+    }
 }

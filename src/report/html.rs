@@ -3,7 +3,7 @@
 //!
 //! Reads `Content`; writes text. Every number is shown as it was measured.
 
-use super::{Content, charts, slice};
+use super::{Content, slice};
 use crate::config::Feedback;
 use crate::inspect::decide;
 use crate::monitor::Row;
@@ -42,9 +42,8 @@ fn judged(value: f64, limit: f64) -> String {
     format!("<span class=\"{class}\">{value:.1e}</span> (limit {limit:.0e})")
 }
 
-/// The page.
-pub fn page(c: &Content) -> std::io::Result<String> {
-    let pictures = charts::all(c);
+/// The page, with the pictures of `charts::all`.
+pub fn page(c: &Content, pictures: &[(&'static str, String)]) -> std::io::Result<String> {
     let figure = |s: &mut String, names: &[&str]| {
         for (_, svg) in pictures.iter().filter(|p| names.contains(&p.0)) {
             let _ = writeln!(s, "<figure>{svg}</figure>");

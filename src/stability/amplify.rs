@@ -6,6 +6,7 @@
 //! know schemes or time steps.
 
 use super::frozen::{Frozen, State};
+use crate::bench::scene;
 use crate::scheme::History;
 use crate::step::StepError;
 
@@ -69,10 +70,7 @@ pub fn growth(f: &mut Frozen, base: &State) -> Result<f64, StepError> {
     let mut d = blank(base);
     // every cell another direction: all modes are in it
     let mut seed = 1u64;
-    let mut random = || {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    };
+    let mut random = || 2.0 * scene::random(&mut seed) - 1.0;
     d.fluid.iter_mut().for_each(|u| *u = [(); 3].map(|()| random()));
     if !f.held() {
         d.velocity.iter_mut().for_each(|u| *u = [(); 3].map(|()| random()));

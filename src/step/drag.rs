@@ -205,7 +205,7 @@ impl CouplingStep {
         });
         self.smooth_work(Direction::Spread);
         self.sum_classes();
-        let other = self.wide.is_some() || self.setup.average.is_some();
+        let other = self.elsewhere();
         let rows = if other { &self.cells } else { &self.active.rows };
         let pieces = threads::rows(rows, self.mesh.len());
         let ends = || pieces.iter().map(|p| p.1.end);

@@ -304,6 +304,10 @@ impl CouplingStep {
             self.classes.cells_of(&self.active.rows, &mut self.cells);
         }
     }
+    /// The sources are those of `cells`, not of the active rows.
+    fn elsewhere(&self) -> bool {
+        self.wide.is_some() || self.setup.average.is_some()
+    }
     /// Sums `work` over the classes.
     fn sum_classes(&mut self) {
         if self.wide.is_some() {

@@ -40,7 +40,7 @@ impl CouplingStep {
             self.smoothed = self.summed().to_vec();
         }
         let average = self.setup.average.filter(|_| !first);
-        let other = self.wide.is_some() || self.setup.average.is_some();
+        let other = self.elsewhere();
         let (q, rows) = (&mut self.sources, if other { &self.cells } else { &self.active.rows });
         if self.filled != *rows {
             for j in self.filled.iter().map(|j| *j as usize) {
@@ -103,7 +103,7 @@ impl CouplingStep {
         let bad = |j: &&u32| {
             self.sources.voidage[**j as usize].is_nan() || self.sources.voidage[**j as usize] <= 0.0
         };
-        let other = self.wide.is_some() || self.setup.average.is_some();
+        let other = self.elsewhere();
         match if other { &self.cells } else { &self.active.rows }.iter().find(bad) {
             None => Ok(()),
             Some(j) => {

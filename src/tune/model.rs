@@ -39,15 +39,12 @@ const SAMPLE: usize = 64;
 impl Scene {
     /// Of the last whole exchange.
     pub fn last<R: Read + Seek>(mut m: Moments<R>) -> Result<Self, RecordError> {
-        for n in (0..m.exchanges.len()).rev() {
-            let Some(x) = m.at(n)? else { continue };
-            let mut particles = x.particles()?;
-            let mut hosts = vec![NONE; particles.len()];
-            // those outside have no host: the step stops at them, or leaves them out
-            let _ = Locator::new(&m.mesh).locate(&m.mesh, &mut particles.position, &mut hosts);
-            return Ok(Self { k: x.k, mesh: m.mesh, particles, hosts });
-        }
-        Err(RecordError::NoExchange)
+        let x = m.last()?.ok_or(RecordError::NoExchange)?;
+        let mut particles = x.particles()?;
+        let mut hosts = vec![NONE; particles.len()];
+        // those outside have no host: the step stops at them, or leaves them out
+        let _ = Locator::new(&m.mesh).locate(&m.mesh, &mut particles.position, &mut hosts);
+        Ok(Self { k: x.k, mesh: m.mesh, particles, hosts })
     }
 
     /// Diameter of the largest particle, m.

@@ -8,6 +8,7 @@ use super::dem::Dem;
 use super::{
     BANDWIDTH, DENSITY, DIAMETER, INTERVAL, LENGTH, Mode, PARTICLES, PERIOD, Point, SOLID_FRACTION, column,
 };
+use crate::bench::scene::random;
 use crate::forces::{self, Extra};
 use crate::interpolate::FluidVelocity;
 use crate::map::ParticleCentroid;
@@ -46,12 +47,6 @@ pub struct Bench {
     exchange: u64,
     started: [f64; 3],
     external: [f64; 3],
-}
-
-/// Random number in [0, 1).
-pub(super) fn random(seed: &mut u64) -> f64 {
-    *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-    (*seed >> 11) as f64 / (1u64 << 53) as f64
 }
 
 /// The column for this cell size: ε_s has the same mean on all.

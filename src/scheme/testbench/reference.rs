@@ -6,8 +6,9 @@
 //! second order (2 of half, minus 1 of whole); particle velocities are eliminated, leaving one dense system of the
 //! cells. Written from the equations alone: it shares mapping and smoothing with the step, nothing else.
 
-use super::bench::{drive, held, mesh_of, random};
+use super::bench::{drive, held, mesh_of};
 use super::{BANDWIDTH, DENSITY, DIAMETER, Mode, PARTICLES, PERIOD, Point};
+use crate::bench::scene::random;
 use crate::locate::Locator;
 use crate::mesh::NONE;
 use crate::smooth::{self, Active, Diffusion, Direction, Scratch};
