@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! What the mappings cost and what they are worth: `cargo run --release --example mappings -- [cost|error|bed]`.
+//! What the mappings cost and what they are worth: `cargo run --release --example mappings -- [cost|error|kernel|bed]`.
 //!
-//! cost: µs per particle, cell-sorted, in a box of cells of 2.25 mm with particles of 1.2 mm. error: voidage against
-//! the exact Gaussian of the particles, with T reduced by the deposit's own variance per face. bed: plane-averaged
-//! solid fraction of the settled bed of cases/fluidised-bed on the meshes A to E of Sun & Xiao 2015, table 2.
+//! cost: µs per particle, cell-sorted, in a box of cells of 2.25 mm with particles of 1.2 mm. error: solid fraction against
+//! the exact Gaussian of the particles, on many meshes, by exp(Δ_T) and by forward-euler. kernel: second moments of a point's
+//! field on tetrahedra. bed: plane-averaged solid fraction of the settled bed of cases/fluidised-bed on the meshes A to E of
+//! Sun & Xiao 2015, table 2.
 
+use std::sync::Arc;
 use std::time::Instant;
+use voidage::bench::gauss::Lattice;
 use voidage::locate::Locator;
 use voidage::map::{self, Kernel, Linear, Mapping, Options, ParticleCentroid, Weights};
-use voidage::mesh::made::Made;
+use voidage::mesh::made::{Made, Shape};
 use voidage::mesh::{Mesh, NONE};
+use voidage::smooth::{self, Active, Diffusion, Direction, Field, Graph, Scratch};
 
 fn random(seed: &mut u64) -> f64 {
     *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -32,51 +36,20 @@ fn cosines(mesh: &Mesh) -> Mesh {
     m
 }
 
-/// exp(T L) of one field with T = b²/4 − variance/2 ≥ 0 on each link, by uniformization to 1e-10.
-fn smooth(given: &Mesh, bandwidth: f64, variance: &[f64], straight: bool, phi: &mut [f64]) -> usize {
-    let turned;
-    let mesh = if straight {
-        turned = cosines(given);
-        &turned
-    } else {
-        given
-    };
-    let t = |k: usize| (bandwidth * bandwidth / 4.0 - variance.get(k).map_or(0.0, |v| 0.5 * v)).max(0.0);
-    let mut q = 0.0f64;
-    let mut clipped = 0;
-    for i in 0..mesh.len() {
-        let first = mesh.link_start[i] as usize;
-        q = q.max(
-            mesh.links(i).iter().enumerate().map(|(k, l)| t(first + k) * l.weight).sum::<f64>()
-                / mesh.volume[i],
-        );
-        clipped += (0..mesh.links(i).len()).filter(|k| t(first + k) == 0.0).count();
-    }
-    let (mut now, mut log, mut sum, mut k) = (phi.to_vec(), -q, 0.0, 0.0);
-    phi.iter_mut().for_each(|p| *p = 0.0);
-    loop {
-        let p = f64::exp(log);
-        sum += p;
-        phi.iter_mut().zip(&now).for_each(|(a, b)| *a += p * b);
-        if sum > 1.0 - 1e-10 && k >= q || k > q + 40.0 * q.sqrt() + 100.0 {
-            break;
-        }
-        k += 1.0;
-        log += (q / k).ln();
-        now = (0..mesh.len())
-            .map(|i| {
-                let first = mesh.link_start[i] as usize;
-                let flux: f64 = mesh
-                    .links(i)
-                    .iter()
-                    .enumerate()
-                    .map(|(n, l)| t(first + n) * l.weight * (now[l.to as usize] - now[i]))
-                    .sum();
-                now[i] + flux / (mesh.volume[i] * q)
-            })
-            .collect();
-    }
-    clipped
+/// exp(Δ_T).
+const EXACT: (&str, f64) = ("chebyshev", 1e-9);
+/// Explicit Euler steps; the tolerance is not used.
+const EULER: (&str, f64) = ("forward-euler", 1e-2);
+
+/// One field smoothed by a method of the library with T = b²/4 − variance/2 ≥ 0 on each link.
+fn smooth(mesh: &Mesh, b: f64, variance: Option<&[f64]>, method: (&str, f64), phi: &[f64]) -> Vec<f64> {
+    let t = Diffusion { bandwidth: b, variance, ..Diffusion::default() }.links(mesh);
+    let graph = Arc::new(Graph::new(mesh, &t));
+    let Some(mut s) = smooth::on(method.0, mesh, &t, &graph, method.1) else { panic!("no {}", method.0) };
+    let mut field = Field::zero(mesh.len());
+    field.iter_mut().zip(phi).for_each(|(l, p)| l[0] = *p);
+    s.apply(&mut field, &Active::whole(mesh.len()), Direction::Spread, &mut Scratch::default());
+    field.iter().map(|l| l[0]).collect()
 }
 
 fn deposit(mesh: &Mesh, w: &Weights, volume: &[f64]) -> Vec<f64> {
@@ -137,44 +110,51 @@ fn cost() {
     }
 }
 
+/// Spheres in the lower 0.6 of each axis: anywhere, or on a jiggled lattice, as even as a packed bed, two per mean cell.
+fn spheres(made: &Made, packed: bool) -> Vec<[f64; 3]> {
+    let mut seed = 77;
+    let mut random = |_| random(&mut seed);
+    let cells = made.size.iter().product::<f64>();
+    if !packed {
+        let any = |_| [0, 1, 2].map(&mut random);
+        let list: Vec<[f64; 3]> = (0..(0.3 * cells) as usize).map(any).collect();
+        return list.iter().map(|x| [0, 1, 2].map(|a| made.size[a] * (0.001 + 0.6 * x[a]))).collect();
+    }
+    let n = made.size.map(|s| (0.6 * s * 2f64.cbrt()).round() as usize);
+    let one = |i: usize| {
+        let at = [i % n[0], i / n[0] % n[1], i / n[0] / n[1]];
+        [0, 1, 2].map(|a| 0.6 * made.size[a] * (at[a] as f64 + 0.5 + 0.6 * (random(a) - 0.5)) / n[a] as f64)
+    };
+    (0..n.iter().product()).map(one).collect()
+}
+
 /// Solid fraction error (L2 of the difference ÷ L2 of the exact field) of a bed in the corner of the box.
 fn error() {
     println!(
-        "solid fraction against the exact Gaussian of the particles: relative L2; T: b2/4; T-: less the deposit's variance"
+        "solid fraction against the exact Gaussian of the particles: relative L2 (÷ particle centroid: gain)"
     );
-    println!("(tet*, poly*: smoothed with S.d/d2 on the links instead of |S|/d)");
     println!(
-        "{:8} {:7} {:>5} {:>9} {:>9} {:>9} {:>7} {:>7}",
-        "mesh", "bed", "b/h", "centroid", "linear T", "linear T-", "ratio T", "ratio T-"
+        "T: b2/4; T-: less the deposit's variance; tet*: smoothed with S.d/d2 on the links instead of |S|/d"
     );
-    let n = 8usize;
-    for kind in ["hex", "graded", "tet", "poly"] {
-        let side = n as f64;
-        let made = match kind {
-            "hex" => Made::hex([n; 3], [side; 3]),
-            "graded" => Made::graded([n; 3], [side; 3]),
-            "tet" => Made::tet([4; 3], [4.0 * 6f64.cbrt(); 3]),
-            _ => Made::poly([6; 3], [6.0 * 2f64.cbrt(); 3]),
-        };
-        // h = V^(1/3) of the mean cell = 1
+    println!(
+        "{:16} {:7} {:>4} {:>9} {:>17} {:>17} {:>21} {:>17}",
+        "mesh", "bed", "b/h", "centroid", "linear T", "linear T-", "forward-euler: centr.", "linear T"
+    );
+    // h = V^(1/3) of the mean cell = 1
+    let (fine, side) = ([24.0, 24.0, 40.0], |n: usize, per: f64| [n as f64 * per.cbrt(); 3]);
+    for (name, made, straight) in [
+        ("hex 24x24x40", Made::hex([24, 24, 40], fine), false),
+        ("graded 24x24x40", Made::graded([24, 24, 40], fine), false),
+        ("graded 8x8x8", Made::graded([8; 3], side(8, 1.0)), false),
+        ("poly", Made::poly([6; 3], side(6, 2.0)), false),
+        ("tet", Made::tet([5; 3], side(5, 6.0)), false),
+        ("tet*", Made::tet([5; 3], side(5, 6.0)), true),
+        ("tet mirrored", Made::tet([6; 3], side(6, 6.0)).mirrored(), false),
+    ] {
         let mesh = made.mesh();
+        let links = if straight { cosines(&mesh) } else { mesh.clone() };
         for packed in [false, true] {
-            let mut seed = 77;
-            let mut position: Vec<[f64; 3]> = Vec::new();
-            if packed {
-                // two per cell, a jiggled lattice: as even as a packed bed
-                let count = (0.6 * made.size[0] * 2f64.cbrt()).round() as usize;
-                for i in 0..count.pow(3) {
-                    let c = [i % count, i / count % count, i / count / count];
-                    position.push([0, 1, 2].map(|a| {
-                        0.6 * made.size[a] * (c[a] as f64 + 0.5 + 0.6 * (random(&mut seed) - 0.5))
-                            / count as f64
-                    }));
-                }
-            } else {
-                position =
-                    (0..150).map(|_| made.size.map(|s| s * (0.001 + 0.6 * random(&mut seed)))).collect();
-            }
+            let mut position = spheres(&made, packed);
             let host = locate(&mesh, &mut position);
             let (radius, volume) = (vec![0.1; host.len()], vec![1.0; host.len()]);
             for b in [0.7, 1.0, 2.0, 4.0] {
@@ -184,35 +164,60 @@ fn error() {
                     m.weights(&mesh, &position, &radius, &host, &mut w);
                     deposit(&mesh, &w, &volume)
                 };
-                let exact = field(&mut Kernel::default());
-                let (centroid, mut linear) = (field(&mut ParticleCentroid), Linear::default());
-                let deposited = field(&mut linear);
+                let exact = match Lattice::of_mesh(&mesh) {
+                    Some(lattice) if made.shape == Shape::Hex => {
+                        lattice.solid_fraction(&position, |_| 1.0, |_| b)
+                    }
+                    _ => field(&mut Kernel::default()),
+                };
+                let mut linear = Linear::default();
+                let (centroid, deposited) = (field(&mut ParticleCentroid), field(&mut linear));
                 let variance = linear.link_variance(&mesh);
-                let norm = |mut a: Vec<f64>, variance: &[f64], straight| {
-                    smooth(&mesh, b, variance, straight, &mut a);
+                let gap = |variance: Option<&[f64]>, method, phi: &[f64]| {
+                    let a = smooth(&links, b, variance, method, phi);
                     let sum = |f: &dyn Fn(usize) -> f64| {
                         (0..mesh.len()).map(|i| mesh.volume[i] * f(i).powi(2)).sum::<f64>()
                     };
                     (sum(&|i| a[i] - exact[i]) / sum(&|i| exact[i])).sqrt()
                 };
-                for straight in [false, true] {
-                    if straight && (kind == "hex" || kind == "graded") {
-                        continue;
-                    }
-                    let (c, t, less) = (
-                        norm(centroid.clone(), &[], straight),
-                        norm(deposited.clone(), &[], straight),
-                        norm(deposited.clone(), &variance, straight),
-                    );
-                    let name = format!("{kind}{}", if straight { "*" } else { "" });
-                    let bed = if packed { "packed" } else { "random" };
-                    println!(
-                        "{name:8} {bed:7} {b:5.1} {c:9.4} {t:9.4} {less:9.4} {:7.2} {:7.2}",
-                        c / t,
-                        c / less
-                    );
+                let c = gap(None, EXACT, &centroid);
+                let of = |e: f64| format!("{e:9.4} ({:5.2})", c / e);
+                println!(
+                    "{name:16} {:7} {b:4.1} {c:9.4} {:>17} {:>17} {:>21} {:>17}",
+                    if packed { "packed" } else { "random" },
+                    of(gap(None, EXACT, &deposited)),
+                    of(gap(Some(&variance), EXACT, &deposited)),
+                    of(gap(None, EULER, &centroid)),
+                    of(gap(None, EULER, &deposited)),
+                );
+            }
+        }
+    }
+}
+
+/// Second moments of the field of one cell ÷ b²/2, mean over the tetrahedra in the middle of a box.
+fn kernel() {
+    for (name, made) in [
+        ("tet", Made::tet([10; 3], [10.0 * 6f64.cbrt(); 3])),
+        ("tet mirrored", Made::tet([10; 3], [10.0 * 6f64.cbrt(); 3]).mirrored()),
+    ] {
+        let mesh = made.mesh();
+        let middle = 0.5 * made.size[0];
+        let near = |j: &usize| mesh.centre[*j].iter().all(|x| (x - middle).abs() < 1.4);
+        let sources: Vec<usize> = (0..mesh.len()).filter(near).collect();
+        for b in [2.0, 4.0] {
+            let mut moment = [[0.0; 3]; 3];
+            for j in &sources {
+                let mut phi = vec![0.0; mesh.len()];
+                phi[*j] = 1.0 / mesh.volume[*j];
+                let out = smooth(&mesh, b, None, EXACT, &phi);
+                for (i, p) in out.iter().enumerate() {
+                    let d = [0, 1, 2].map(|a| mesh.centre[i][a] - mesh.centre[*j][a]);
+                    let m = p * mesh.volume[i] / sources.len() as f64 / (0.5 * b * b);
+                    (0..3).for_each(|a| (0..3).for_each(|c| moment[a][c] += m * d[a] * d[c]));
                 }
             }
+            println!("{name:13} b/h {b}: {} sources, moments {moment:.3?}", sources.len());
         }
     }
 }
@@ -236,9 +241,14 @@ fn bed() {
     let v = std::f64::consts::PI / 6.0 * d.powi(3);
     let meshes =
         [("A", [6, 16, 1]), ("B", [9, 25, 2]), ("C", [18, 50, 4]), ("D", [36, 100, 8]), ("E", [72, 200, 16])];
-    for (label, made_mapping, less) in
-        [("particle-centroid", false, false), ("linear, T", true, false), ("linear, T-", true, true)]
-    {
+    let cases = [
+        ("particle-centroid", false, false, EXACT),
+        ("linear, T", true, false, EXACT),
+        ("linear, T-", true, true, EXACT),
+        ("particle-centroid, euler", false, false, EULER),
+        ("linear, T, euler", true, false, EULER),
+    ];
+    for (label, made_mapping, less, method) in cases {
         let mut profiles: Vec<[Vec<f64>; 2]> = Vec::new();
         for (_, n) in meshes {
             let mesh = Made::hex(n, size).mesh();
@@ -249,9 +259,9 @@ fn bed() {
             linear.prepare(&mesh, &Options::default());
             let m: &dyn Mapping = if made_mapping { &linear } else { &ParticleCentroid };
             m.weights(&mesh, &position, &vec![0.5 * d; position.len()], &host, &mut w);
-            let mut phi = deposit(&mesh, &w, &vec![v; position.len()]);
-            let variance = if less { m.link_variance(&mesh) } else { Vec::new() };
-            smooth(&mesh, 4.0 * d, &variance, false, &mut phi);
+            let phi = deposit(&mesh, &w, &vec![v; position.len()]);
+            let variance = less.then(|| m.link_variance(&mesh));
+            let phi = smooth(&mesh, 4.0 * d, variance.as_deref(), method, &phi);
             // planes across x and y
             let profile = |axis: usize| -> Vec<f64> {
                 let mut sum = vec![(0.0, 0.0); n[axis]];
@@ -267,7 +277,7 @@ fn bed() {
         for axis in 0..2 {
             // cubic through cell means of the finest mesh: compare cell means with means of E over the same cells
             let fine = &profiles[4][axis];
-            print!("{label:18} profile along {}: L2 against E:", ["x", "y"][axis]);
+            print!("{label:24} profile along {}: L2 against E:", ["x", "y"][axis]);
             for (m, (name, _)) in meshes.iter().enumerate().take(4) {
                 let coarse = &profiles[m][axis];
                 let mean = |i: usize| {
@@ -291,7 +301,7 @@ fn bed() {
 
 fn main() {
     let what = std::env::args().nth(1).unwrap_or_default();
-    for (name, run) in [("cost", cost as fn()), ("error", error), ("bed", bed)] {
+    for (name, run) in [("cost", cost as fn()), ("error", error), ("kernel", kernel), ("bed", bed)] {
         if what.is_empty() || what == name {
             run();
         }

@@ -6,6 +6,7 @@
 //! and neighbours in space are neighbours in memory. Does not know positions.
 
 use crate::mesh::NONE;
+use crate::threads;
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -39,41 +40,86 @@ pub struct Order {
 }
 
 impl Order {
-    /// The new order, as places in the table that `id` and `host` belong to. Sorts by counting; within a cell the
-    /// table is nearly in order as a rule.
+    /// The new order, as places in the table that `id` and `host` belong to. Sorts by counting, a run of the table and of
+    /// the cells on each thread: the table is nearly in order as a rule, and few of a run's particles are in another's cells.
     pub fn update(&mut self, cells: usize, id: &[i64], host: &[u32]) -> &[u32] {
-        self.count.clear();
+        let (runs, n) = (threads::count(), host.len());
+        let first = |k: usize| k * n / runs;
+        // where each run's cells end
+        let mut ends: Vec<usize> = Vec::with_capacity(runs);
+        for k in 1..runs {
+            let h = host.get(first(k)).filter(|h| **h != NONE).map_or(0, |h| *h as usize);
+            ends.push(h.max(ends.last().copied().unwrap_or(0)));
+        }
+        ends.push(cells);
+        let begin = |k: usize| if k == 0 { 0 } else { ends[k - 1] };
+        let mine = |k: usize, h: u32| (begin(k)..ends[k]).contains(&(h as usize));
         self.count.resize(cells, 0);
-        self.inside = 0;
-        for h in host.iter().filter(|h| **h != NONE) {
-            self.count[*h as usize] += 1;
-            self.inside += 1;
-        }
-        self.occupied.clear();
-        self.start.clear();
-        let mut begin = 0;
-        for (cell, n) in self.count.iter_mut().enumerate().filter(|c| *c.1 > 0) {
-            self.occupied.push(cell as u32);
-            self.start.push(begin);
-            begin += std::mem::replace(n, begin);
-        }
-        self.start.push(begin);
-        self.list.resize(self.inside, 0);
-        for (i, h) in host.iter().enumerate().filter(|h| *h.1 != NONE) {
-            let next = &mut self.count[*h as usize];
-            self.list[*next as usize] = i as u32;
-            *next += 1;
-        }
-        for run in self.start.windows(2) {
-            let list = &mut self.list[run[0] as usize..run[1] as usize];
-            if !list.is_sorted_by_key(|i| id[*i as usize]) {
-                list.sort_unstable_by_key(|i| id[*i as usize]);
+        let parts = threads::cut(&mut self.count, ends.iter().copied());
+        let strays = threads::map(parts.into_iter().enumerate().collect(), |(k, count)| {
+            count.fill(0);
+            let mut strays = Vec::new();
+            for i in first(k)..first(k + 1) {
+                match host[i] {
+                    h if mine(k, h) => count[h as usize - begin(k)] += 1,
+                    _ => strays.push(i as u32),
+                }
+            }
+            strays
+        });
+        let mut guests = vec![Vec::new(); runs];
+        let mut lost = Vec::new();
+        for i in strays.concat() {
+            match host[i as usize] {
+                NONE => lost.push(i),
+                h => {
+                    self.count[h as usize] += 1;
+                    guests[ends.partition_point(|e| *e <= h as usize)].push(i);
+                }
             }
         }
-        if self.inside < host.len() {
-            self.list.extend((0..host.len() as u32).filter(|i| host[*i as usize] == NONE));
-            self.list[self.inside..].sort_unstable_by_key(|i| id[*i as usize]);
+        let parts = threads::cut(&mut self.count, ends.iter().copied());
+        let starts = threads::map(parts.into_iter().enumerate().collect(), |(k, count)| {
+            let (mut at, mut occupied, mut start) = (0, Vec::new(), Vec::new());
+            for (cell, n) in (begin(k)..).zip(count).filter(|c| *c.1 > 0) {
+                occupied.push(cell as u32);
+                start.push(at);
+                at += std::mem::replace(n, at);
+            }
+            (occupied, start, at)
+        });
+        self.occupied.clear();
+        self.start.clear();
+        let (mut at, mut places) = (0, Vec::with_capacity(runs));
+        for (occupied, start, n) in &starts {
+            self.occupied.extend(occupied);
+            self.start.extend(start.iter().map(|s| s + at));
+            at += n;
+            places.push(at as usize);
         }
+        self.start.push(at);
+        self.inside = at as usize;
+        self.list.resize(self.inside, 0);
+        let counts = threads::cut(&mut self.count, ends.iter().copied());
+        let lists = threads::cut(&mut self.list, places);
+        let work = counts.into_iter().zip(lists).zip(&starts).zip(&guests).enumerate().collect();
+        threads::map(work, |(k, (((next, list), (_, start, _)), guests))| {
+            let own = (first(k)..first(k + 1)).filter(|i| mine(k, host[*i])).map(|i| i as u32);
+            for i in own.chain(guests.iter().copied()) {
+                let next = &mut next[host[i as usize] as usize - begin(k)];
+                list[*next as usize] = i;
+                *next += 1;
+            }
+            let last = list.len() as u32;
+            for (from, to) in start.iter().zip(start.iter().skip(1).chain([&last])) {
+                let list = &mut list[*from as usize..*to as usize];
+                if !list.is_sorted_by_key(|i| id[*i as usize]) {
+                    list.sort_unstable_by_key(|i| id[*i as usize]);
+                }
+            }
+        });
+        lost.sort_unstable_by_key(|i| id[*i as usize]);
+        self.list.append(&mut lost);
         self.cut(cells);
         &self.list
     }
@@ -166,6 +212,33 @@ mod tests {
         }
         assert_eq!((o.pieces[0].slots.start, o.pieces[2].slots.end), (0, 10_000));
         assert_eq!(o.pieces[2].particles.end, host.len());
+    }
+
+    #[test]
+    fn the_order_does_not_depend_on_threads_or_on_the_table() {
+        let mut seed = 9;
+        let mut random = |n: u32| (crate::bench::scene::random(&mut seed) * f64::from(n)) as u32;
+        let n = 20_000;
+        let id: Vec<i64> = (0..n).map(|i| i64::from(i * 7919 % n)).collect();
+        // in order but for some; in no order; all in the last cell; all lost
+        let near: Vec<u32> = (0..n).map(|i| if random(20) == 0 { random(3000) } else { i / 8 }).collect();
+        let any: Vec<u32> = (0..n).map(|_| if random(50) == 0 { NONE } else { random(3000) }).collect();
+        for host in [near, any, vec![2999; n as usize], vec![NONE; n as usize], Vec::new()] {
+            let mut want: Vec<u32> = (0..host.len() as u32).collect();
+            want.sort_by_key(|i| (host[*i as usize], id[*i as usize]));
+            for threads in [1, 2, 3, 8] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let mut o = Order::default();
+                pool.install(|| o.update(3000, &id[..host.len()], &host).to_vec());
+                assert!(o.list == want, "{threads}");
+                let occupied = o.start.windows(2).zip(&o.occupied);
+                occupied.for_each(|(s, c)| {
+                    let of = &o.list[s[0] as usize..s[1] as usize];
+                    assert!(!of.is_empty() && of.iter().all(|i| host[*i as usize] == *c));
+                });
+                assert_eq!(*o.start.last().unwrap() as usize, o.inside);
+            }
+        }
     }
 
     #[test]

@@ -160,7 +160,7 @@ pub fn smoothers(quick: bool) -> Result<Smoother, String> {
     };
     let mut others: Vec<_> = [1e-1, 1e-2, 1e-3, 1e-6, 1e-8].map(|t| ("chebyshev", t)).into();
     others.extend([1e-2, 1e-4].map(|t| ("uniformization", t)));
-    others.push(("chebyshev-u", 1e-2));
+    others.extend([("chebyshev-u", 1e-2), ("forward-euler", 1e-2)]);
     others.extend(["crank-nicolson-1", "backward-euler"].map(|name| (name, 1e-6)));
     let s = smoother::run(&scene, &others)?;
     Ok(Smoother {

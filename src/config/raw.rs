@@ -496,7 +496,7 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
         "smooth.method",
         "",
         "chebyshev",
-        "chebyshev | chebyshev-u | uniformization (positive by proof) | crank-nicolson | crank-nicolson-1 | backward-euler | constdiff | direct | none",
+        "chebyshev | chebyshev-u | uniformization (positive by proof) | forward-euler (positive by proof; nearest to the Gaussian at b/h up to 2) | crank-nicolson | crank-nicolson-1 | backward-euler | constdiff | direct | none",
     ),
     (
         "smooth.bandwidth",

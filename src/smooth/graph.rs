@@ -18,10 +18,16 @@ pub struct Rows<T> {
     pub(super) to: Vec<u32>,
     /// a_ij
     pub(super) a: Vec<T>,
+    /// A_ii = Σ_j a_ij
+    pub(super) d: Vec<T>,
     /// lines and the rest, without a gap
     pub(super) runs: Vec<Run>,
     /// run of the first row of each block
     pub(super) first_run: Vec<u32>,
+    /// largest distance of a neighbour, rows
+    pub(super) width: usize,
+    /// mean size of a row, bytes
+    pub(super) bytes: usize,
 }
 
 /// Most neighbours of a row in a line.
@@ -30,7 +36,7 @@ pub(super) const LINE: usize = 6;
 const SHORTEST: usize = 8;
 
 /// Rows that follow each other: a line of hexahedra whose neighbours all stand at the same distances, or others.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Run {
     /// row after the last
     pub end: u32,
@@ -42,6 +48,13 @@ pub(super) struct Run {
     pub offsets: [i32; LINE],
 }
 
+impl Run {
+    /// Bytes that a row with so many neighbours takes, in numbers of so many bytes.
+    fn bytes(&self, entries: usize, size: usize) -> usize {
+        if self.entries > 0 { size * (1 + entries) } else { 4 + size + (size + 4) * entries }
+    }
+}
+
 /// Kinds of lines for which there is a loop (entries, west): inside a block of hexahedra, on one of its sides, in a plane.
 const LINES: [(u8, u8); 4] = [(6, 2), (5, 2), (5, 1), (4, 1)];
 
@@ -50,7 +63,7 @@ fn runs(start: &[u32], to: &[u32]) -> Vec<Run> {
     let rows = start.len() - 1;
     let line_of = |i: usize| -> Option<Run> {
         let to = &to[start[i] as usize..start[i + 1] as usize];
-        let mut run = Run { end: i as u32 + 1, entries: to.len() as u8, west: 0, offsets: [0; LINE] };
+        let mut run = Run { end: i as u32 + 1, entries: to.len() as u8, ..Run::default() };
         if to.len() > LINE {
             return None;
         }
@@ -61,7 +74,7 @@ fn runs(start: &[u32], to: &[u32]) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
     let other = |end: usize, runs: &mut Vec<Run>| match runs.last_mut().filter(|r| r.entries == 0) {
         Some(last) => last.end = end as u32,
-        None => runs.push(Run { end: end as u32, entries: 0, west: 0, offsets: [0; LINE] }),
+        None => runs.push(Run { end: end as u32, ..Run::default() }),
     };
     let mut i = 0;
     while i < rows {
@@ -136,7 +149,7 @@ impl Graph {
             start.push(to.len() as u32);
         }
         let rows = Rows::new(start, to, a);
-        let d = rows.diagonal();
+        let d = rows.d.clone();
         let mut graph = Self { rows, order, spectrum: 0.0, diagonal: 0.0 };
         graph.spectrum = graph.links().map(|(i, j)| d[i as usize] + d[j as usize]).fold(0.0, f64::max);
         graph.diagonal = d.iter().copied().fold(0.0, f64::max);
@@ -174,8 +187,7 @@ impl Graph {
                     run += 1;
                 }
                 let entries = (self.rows.start[i + 1] - self.rows.start[i]) as usize;
-                let index = if self.rows.runs[run].entries > 0 { 0 } else { 4 + 4 * entries };
-                sum += 64 * fields + 8 * entries + index;
+                sum += 64 * fields + self.rows.runs[run].bytes(entries, 8);
             }
         }
         sum as f64
@@ -206,12 +218,25 @@ impl<T: Real> Rows<T> {
             at as u32
         });
         let first_run = first_run.collect();
-        Self { start, to, a, runs, first_run }
+        let own = |w: &[u32]| T::from_f64(a[w[0] as usize..w[1] as usize].iter().map(|a| a.to_f64()).sum());
+        let d = start.windows(2).map(own).collect();
+        let far = |(i, w): (usize, &[u32])| {
+            to[w[0] as usize..w[1] as usize].iter().map(|j| j.abs_diff(i as u32)).max().unwrap_or(0)
+        };
+        let width = start.windows(2).enumerate().map(far).max().unwrap_or(0) as usize;
+        let (mut begin, mut bytes) = (0, 0);
+        for run in &runs {
+            let (end, entries) = (run.end as usize, (start[run.end as usize] - start[begin]) as usize);
+            bytes += (end - begin) * run.bytes(entries.div_ceil(end - begin), size_of::<T>());
+            begin = end;
+        }
+        bytes /= begin.max(1);
+        Self { start, to, a, d, runs, first_run, width, bytes }
     }
     /// Every row by its indices.
     #[cfg(test)]
     pub(super) fn forget_lines(&mut self) {
-        self.runs = vec![Run { end: self.len() as u32, entries: 0, west: 0, offsets: [0; LINE] }];
+        self.runs = vec![Run { end: self.len() as u32, ..Run::default() }];
         self.first_run.fill(0);
     }
     pub(super) fn len(&self) -> usize {
@@ -220,10 +245,6 @@ impl<T: Real> Rows<T> {
     pub(super) fn entries(&self, i: usize) -> (&[u32], &[T]) {
         let range = self.start[i] as usize..self.start[i + 1] as usize;
         (&self.to[range.clone()], &self.a[range])
-    }
-    /// A_ii.
-    pub(super) fn diagonal(&self) -> Vec<f64> {
-        (0..self.len()).map(|i| self.entries(i).1.iter().map(|a| a.to_f64()).sum()).collect()
     }
     /// The same rows in another precision.
     pub(super) fn cast<U: Real>(&self) -> Rows<U> {

@@ -8,11 +8,12 @@
 //! a pair takes two sweeps, 160 bytes on average: the recurrence takes 256. One field of scratch.
 //! Every factor is 1 at A = 0: constants and Σ V φ are kept to rounding whatever the roots are.
 
+use super::blocked::{self, Step};
 use super::factors::Factor;
 use super::graph::{Graph, Rows};
 use super::real::Real;
 use super::recurrence::copy;
-use super::sweep::{ALONE, OUT, Sweep, cuts, reach};
+use super::sweep::reach;
 use super::{Active, Direction};
 
 /// Factors in the order they are applied, and σ.
@@ -37,37 +38,27 @@ impl Product {
         direction: Direction,
         spare: &mut [[T; 8]],
     ) {
-        let m = self.degree();
-        let cuts = &cuts(active, m);
-        let (mut done, mut now, mut out) = (0, field, spare);
-        let mut in_field = true;
-        for f in &self.factors {
+        let (m, mut steps) = (self.degree(), Vec::new());
+        let mut next = |add, factors| {
             // written for the first time: far rows must read as zero in a spread
-            let mut next = |factors| {
-                let zero = if direction != Direction::Gather && done == 0 { m as u16 + 1 } else { 0 };
-                done += 1;
-                let reach = reach(direction, m, done) as u16;
-                Sweep { rows, active, reach, zero, now: &[], factors }
-            };
+            let zero = if direction != Direction::Gather && steps.is_empty() { m as u16 + 1 } else { 0 };
+            let reach = reach(direction, m, steps.len() + 1) as u16;
+            steps.push(Step { add, factors, reach, zero });
+        };
+        for f in &self.factors {
             match *f {
-                Factor::Real { root } => {
-                    let s = next([1.0, -self.scale / (1.0 - root), 0.0, 0.0]);
-                    Sweep { now, ..s }.run::<ALONE>(cuts, &[], out);
-                    std::mem::swap(&mut now, &mut out);
-                    in_field = !in_field;
-                }
+                Factor::Real { root } => next(false, [1.0, -self.scale / (1.0 - root), 0.0, 0.0]),
                 Factor::Pair { real, imaginary } => {
                     let n = (1.0 - real).powi(2) + imaginary.powi(2);
-                    let s = next([0.0, 1.0, 0.0, 0.0]);
-                    Sweep { now, ..s }.run::<ALONE>(cuts, &[], out);
                     let (first, second) = (2.0 * (1.0 - real) * self.scale / n, self.scale.powi(2) / n);
-                    let s = next([-first, second, 0.0, 1.0]);
-                    Sweep { now: out, ..s }.run::<OUT>(cuts, &[], now);
+                    next(false, [0.0, 1.0, 0.0, 0.0]);
+                    next(true, [-first, second, 0.0, 1.0]);
                 }
             }
         }
-        if !in_field {
-            copy(now, out, active, reach(direction, m, m));
+        blocked::run(rows, active, &steps, [&mut *field, &mut *spare]);
+        if m % 2 == 1 {
+            copy(spare, field, active, reach(direction, m, m));
         }
     }
 

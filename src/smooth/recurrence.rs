@@ -47,7 +47,15 @@ pub(super) fn apply<T: Real>(
         let gamma = if k == 0 { r.last } else { r.gamma };
         let zero = if direction != Direction::Gather && fresh { m as u16 + 1 } else { 0 };
         let reach = reach(direction, m, m - k) as u16;
-        Sweep { rows, active, reach, zero, now: &[], factors: [gamma, -gamma * r.scale, r.alpha[k], -1.0] }
+        Sweep {
+            rows,
+            active,
+            reach,
+            zero,
+            now: &[],
+            base: 0,
+            factors: [gamma, -gamma * r.scale, r.alpha[k], -1.0],
+        }
     };
     // b_m = α_m φ is not stored: b_{m−1} = α_{m−1} φ + γ α_m X φ
     let mut s = at(m - 1, true);

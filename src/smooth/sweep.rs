@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! One sweep over the rows of the operator: out = p x + q A x [+ r other] [+ s out], on eight lanes of every row within
-//! reach. Each row is computed by itself, in the order of its entries: threads, numbering and the way the
+//! reach, as (p + q A_ii) x − q Σ a far: where both factors are positive no rounding makes a value negative. Each row is computed by itself, in the order of its entries: threads, numbering and the way the
 //! neighbours are found do not change a bit.
 //!
 //! Along a line of a hexahedral mesh (`graph::Run`) the neighbours stand at constant distances: no index is read and
@@ -24,8 +24,10 @@ pub(super) struct Sweep<'a, T> {
     pub reach: u16,
     /// blocks beyond and up to this ring are set to zero
     pub zero: u16,
-    /// x
+    /// x, from row `base` on
     pub now: &'a [[T; 8]],
+    /// a multiple of `BLOCK`
+    pub base: usize,
     /// p, q, r, s
     pub factors: [f64; 4],
 }
@@ -102,18 +104,20 @@ struct Rest<'a, T: Real, S: Simd, const KIND: u8> {
 }
 
 impl<T: Real, S: Simd, const KIND: u8> Rest<'_, T, S, KIND> {
+    /// (own) x − q far [+ …]; own = p + q A_ii.
     #[inline(always)]
     fn result(
         &self,
         k: [T::Of<S>; 4],
+        own: T::Of<S>,
         x: T::Of<S>,
-        flux: T::Of<S>,
+        far: T::Of<S>,
         i: usize,
         lane: usize,
         out: &mut T::Of<S>,
     ) {
         let v = self.v;
-        let mut y = T::add(v, T::mul(v, k[0], x), T::mul(v, k[1], flux));
+        let mut y = T::sub(v, T::mul(v, own, x), T::mul(v, k[1], far));
         if KIND & OTHER > 0 {
             y = T::add(v, y, T::mul(v, k[2], T::vectors::<S>(&self.other[i])[lane]));
         }
@@ -123,33 +127,35 @@ impl<T: Real, S: Simd, const KIND: u8> Rest<'_, T, S, KIND> {
         *out = y;
     }
 
+    /// p, q, r, s, and p + q A_ii of a row.
     #[inline(always)]
-    fn factors(&self) -> [T::Of<S>; 4] {
-        self.sweep.factors.map(|x| T::splat(self.v, T::from_f64(x)))
+    fn factors(&self) -> ([T::Of<S>; 4], impl Fn(T) -> T::Of<S>) {
+        let v = self.v;
+        let k = self.sweep.factors.map(|x| T::splat(v, T::from_f64(x)));
+        (k, move |d: T| T::add(v, k[0], T::mul(v, k[1], T::splat(v, d))))
     }
 
     /// Rows of any kind.
     #[inline(always)]
     fn any(self, out: &mut [[T; 8]]) {
         let (s, v, n) = (self.sweep, self.v, out.len());
-        let k = self.factors();
+        let (k, own) = self.factors();
         let starts = &s.rows.start[self.begin..=self.begin + n];
         let range = starts[0] as usize..starts[n] as usize;
         let (mut to, mut a) = (&s.rows.to[range.clone()], &s.rows.a[range]);
-        let own = &s.now[self.begin..][..n];
+        let (now, d) = (&s.now[self.begin - s.base..][..n], &s.rows.d[self.begin..][..n]);
         for i in 0..n {
             let entries = (starts[i + 1] - starts[i]) as usize;
             let (to_row, to_rest) = to.split_at(entries);
             let (a_row, a_rest) = a.split_at(entries);
             (to, a) = (to_rest, a_rest);
             for (lane, out) in T::vectors_mut::<S>(&mut out[i]).iter_mut().enumerate() {
-                let x = T::vectors::<S>(&own[i])[lane];
-                let mut flux = T::splat(v, T::ZERO);
+                let mut sum = T::splat(v, T::ZERO);
                 for (a, to) in a_row.iter().zip(to_row) {
-                    let far = T::vectors::<S>(&s.now[*to as usize])[lane];
-                    flux = T::add(v, flux, T::mul(v, T::splat(v, *a), T::sub(v, x, far)));
+                    let far = T::vectors::<S>(&s.now[*to as usize - s.base])[lane];
+                    sum = T::add(v, sum, T::mul(v, T::splat(v, *a), far));
                 }
-                self.result(k, x, flux, i, lane, out);
+                self.result(k, own(d[i]), T::vectors::<S>(&now[i])[lane], sum, i, lane, out);
             }
         }
     }
@@ -158,27 +164,28 @@ impl<T: Real, S: Simd, const KIND: u8> Rest<'_, T, S, KIND> {
     #[inline(always)]
     fn line<const N: usize, const W: usize>(self, out: &mut [[T; 8]], offsets: &[i32; LINE]) {
         let (s, v, n) = (self.sweep, self.v, out.len());
-        let k = self.factors();
+        let (k, own) = self.factors();
         let first = s.rows.start[self.begin] as usize;
         let a = &s.rows.a[first..][..N * n].as_chunks::<N>().0[..n];
+        let at = self.begin - s.base;
         let far: [&[[T; 8]]; N] =
-            std::array::from_fn(|k| &s.now[self.begin.wrapping_add_signed(offsets[k] as isize)..][..n]);
-        let own = &s.now[self.begin..][..n];
+            std::array::from_fn(|k| &s.now[at.wrapping_add_signed(offsets[k] as isize)..][..n]);
+        let (now, d) = (&s.now[at..][..n], &s.rows.d[self.begin..][..n]);
         for lane in 0..T::vectors::<S>(&[T::ZERO; 8]).len() {
             let mut west = T::vectors::<S>(&far[W][0])[lane];
-            let mut x = T::vectors::<S>(&own[0])[lane];
+            let mut x = T::vectors::<S>(&now[0])[lane];
             for i in 0..n {
                 let east = T::vectors::<S>(&far[W + 1][i])[lane];
-                let mut flux = T::splat(v, T::ZERO);
+                let mut sum = T::splat(v, T::ZERO);
                 for k in 0..N {
                     let far = match k {
                         _ if k == W => west,
                         _ if k == W + 1 => east,
                         _ => T::vectors::<S>(&far[k][i])[lane],
                     };
-                    flux = T::add(v, flux, T::mul(v, T::splat(v, a[i][k]), T::sub(v, x, far)));
+                    sum = T::add(v, sum, T::mul(v, T::splat(v, a[i][k]), far));
                 }
-                self.result(k, x, flux, i, lane, &mut T::vectors_mut::<S>(&mut out[i])[lane]);
+                self.result(k, own(d[i]), x, sum, i, lane, &mut T::vectors_mut::<S>(&mut out[i])[lane]);
                 (west, x) = (x, east);
             }
         }
@@ -186,6 +193,11 @@ impl<T: Real, S: Simd, const KIND: u8> Rest<'_, T, S, KIND> {
 }
 
 impl<T: Real> Sweep<'_, T> {
+    /// Runs it on this thread, on the rows of `out`, which begins with `first_block`.
+    pub(super) fn part<const KIND: u8>(&self, first_block: usize, out: &mut [[T; 8]]) {
+        T::dispatch(Part::<T, KIND> { sweep: self, first_block, other: &[], out });
+    }
+
     /// Runs it on every thread of the pool; `cuts`: first block of each thread and the end.
     pub(super) fn run<const KIND: u8>(&self, cuts: &[usize], other: &[[T; 8]], mut out: &mut [[T; 8]]) {
         let part = |first_block, out| T::dispatch(Part::<T, KIND> { sweep: self, first_block, other, out });

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Boxes of hexahedra, and of the six tetrahedra each can be cut into (Kuhn: one per order of the axes, all along
-//! the main diagonal, so neighbours and opposite sides of the box fit).
+//! the main diagonal, so neighbours and opposite sides of the box fit; every other one mirrored if asked for).
 
 use super::super::geometry::{V, cross, dot, sub};
 use super::{Across, Made, Soup, hash};
@@ -102,10 +102,12 @@ pub(super) fn tet(m: &Made) -> Soup {
     for c in corners(m) {
         for (t, order) in ORDERS.iter().enumerate() {
             let cell = 6 * id(m.n, c) + t;
-            let mut at = c;
-            let mut path = [c; 4];
+            // a mirrored box begins at its upper end
+            let back = c.map(|i| m.mirrored && i % 2 == 1);
+            let mut at = [0, 1, 2].map(|a| c[a] + usize::from(back[a]));
+            let mut path = [at; 4];
             for (i, axis) in order.iter().enumerate() {
-                at[*axis] += 1;
+                at[*axis] = c[*axis] + usize::from(!back[*axis]);
                 path[i + 1] = at;
             }
             let p = path.map(|q| soup.points[id(np, q)]);

@@ -37,13 +37,15 @@ pub struct Made {
     pub jiggle: f64,
     /// cyclic axes; walls otherwise
     pub cyclic: [bool; 3],
+    /// tet: every other hexahedron along each axis is mirrored, so that the tetrahedra have no common direction
+    pub mirrored: bool,
 }
 
 impl Made {
     /// A uniform box with walls.
     pub fn new(shape: Shape, n: [usize; 3], size: V) -> Self {
         let jiggle = if shape == Shape::Poly { 0.2 } else { 0.0 };
-        Self { shape, n, size, grading: [1.0; 3], jiggle, cyclic: [false; 3] }
+        Self { shape, n, size, grading: [1.0; 3], jiggle, cyclic: [false; 3], mirrored: false }
     }
     /// Uniform hexahedra.
     pub fn hex(n: [usize; 3], size: V) -> Self {
@@ -64,6 +66,10 @@ impl Made {
     /// Cyclic along the axes marked (hex and tet need one lattice cell there, poly three).
     pub fn cyclic(self, cyclic: [bool; 3]) -> Self {
         Self { cyclic, ..self }
+    }
+    /// Tetrahedra without a common direction; even numbers of lattice cells along cyclic axes.
+    pub fn mirrored(self) -> Self {
+        Self { mirrored: true, ..self }
     }
     /// Inner points or seeds pushed about.
     pub fn jiggled(self, jiggle: f64) -> Self {

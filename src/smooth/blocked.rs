@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Sweeps that follow each other, several at a time while their rows are in the cache (time skewing, Wonnacott 2000): the next sweep
+//! follows the one before at the distance of the furthest neighbour. A row is read from memory once for all of them.
+//!
+//! Sweep k reads field k mod 2 and writes the other. Two fields are enough for any number of sweeps at a time: what a sweep
+//! overwrites, the one before no longer needs. On several threads each has its own rows and stays clear of its neighbours' by
+//! one distance more in each sweep; then the gaps between the threads are filled.
+//!
+//! Every row is computed as it is without this: how many sweeps go together does not change a bit.
+
+use super::Active;
+use super::active::BLOCK;
+use super::graph::Rows;
+use super::real::Real;
+use super::sweep::{ALONE, OUT, Sweep, cuts};
+use std::ops::Range;
+use std::sync::OnceLock;
+
+/// One sweep.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Step {
+    /// adds to what is there (`OUT`), or not (`ALONE`)
+    pub add: bool,
+    /// as in `Sweep`
+    pub factors: [f64; 4],
+    /// blocks up to this ring are computed
+    pub reach: u16,
+    /// blocks beyond and up to this ring are set to zero
+    pub zero: u16,
+}
+
+/// Blocks that a sweep advances at a time.
+const CHUNK: usize = 16;
+
+/// Share of the cache that rows in flight may take.
+const SHARE: f64 = 0.7;
+
+/// Rows and steps of one call.
+struct Work<'a, T> {
+    rows: &'a Rows<T>,
+    active: &'a Active,
+    steps: &'a [Step],
+}
+
+/// Runs all steps; the result is in field `steps.len()` mod 2.
+pub(super) fn run<T: Real>(rows: &Rows<T>, active: &Active, steps: &[Step], fields: [&mut [[T; 8]]; 2]) {
+    let reach = steps.iter().map(|s| usize::from(s.reach)).max().unwrap_or(0);
+    run_by(depth(rows, active, reach), rows, active, steps, fields);
+}
+
+/// With so many sweeps at a time, if the threads' rows allow.
+fn run_by<T: Real>(
+    depth: usize,
+    rows: &Rows<T>,
+    active: &Active,
+    steps: &[Step],
+    [a, b]: [&mut [[T; 8]]; 2],
+) {
+    let reach = steps.iter().map(|s| usize::from(s.reach)).max().unwrap_or(0);
+    let cuts = cuts(active, reach);
+    let narrowest = cuts.windows(2).map(|w| w[1] - w[0]).min().unwrap_or(0);
+    let lag = lag(rows.width, BLOCK).max(1);
+    // gaps of the last sweep must not meet
+    let most = if cuts.len() > 2 { narrowest / (2 * lag) } else { usize::MAX };
+    let depth = depth.min(most).max(1);
+    for (k, group) in steps.chunks(depth).enumerate() {
+        let work = Work { rows, active, steps: group };
+        if k * depth % 2 == 0 { work.run(&cuts, a, b) } else { work.run(&cuts, b, a) }
+    }
+}
+
+/// How many sweeps' rows fit into the cache.
+fn depth<T>(rows: &Rows<T>, active: &Active, reach: usize) -> usize {
+    let n = rows.d.len();
+    let share = active.rows_within(reach, n) as f64 / n.max(1) as f64;
+    let row = (16 * size_of::<T>() + rows.bytes) as f64;
+    (SHARE * cache() / ((rows.width as f64 * share + (CHUNK * BLOCK) as f64) * row)) as usize
+}
+
+/// Pieces of so many rows that a neighbour may be away.
+fn lag(width: usize, rows: usize) -> usize {
+    width.div_ceil(rows)
+}
+
+/// Bytes of the second level cache of the first core; 1 MB where the system does not tell.
+fn cache() -> f64 {
+    static SIZE: OnceLock<f64> = OnceLock::new();
+    *SIZE.get_or_init(|| {
+        let text = std::fs::read_to_string("/sys/devices/system/cpu/cpu0/cache/index2/size");
+        let kilobytes = |t: String| t.trim().strip_suffix('K')?.parse::<f64>().ok();
+        text.ok().and_then(kilobytes).map_or(1048576.0, |k| 1024.0 * k)
+    })
+}
+
+impl<T: Real> Work<'_, T> {
+    /// All steps; the first reads a.
+    fn run(&self, cuts: &[usize], a: &mut [[T; 8]], b: &mut [[T; 8]]) {
+        let blocks = cuts[cuts.len() - 1];
+        if cuts.len() == 2 {
+            return self.skewed(0, [a, b], |_| 0..blocks);
+        }
+        let lag = lag(self.rows.width, BLOCK);
+        // one sweep at a time: no gaps, the fields are shared
+        if self.steps.len() > 1 {
+            let (mut rest_a, mut rest_b) = (&mut *a, &mut *b);
+            rayon::scope(|scope| {
+                for w in cuts.windows(2) {
+                    let rows = ((w[1] - w[0]) * BLOCK).min(rest_a.len());
+                    let (mine_a, next_a) = std::mem::take(&mut rest_a).split_at_mut(rows);
+                    let (mine_b, next_b) = std::mem::take(&mut rest_b).split_at_mut(rows);
+                    (rest_a, rest_b) = (next_a, next_b);
+                    let (low, high) = (w[0], w[1]);
+                    let range = move |step: usize| {
+                        let clear = (step + 1) * lag;
+                        let from = if low == 0 { 0 } else { low + clear };
+                        from..if high == blocks { high } else { high - clear }
+                    };
+                    scope.spawn(move |_| self.skewed(low, [mine_a, mine_b], range));
+                }
+            });
+        }
+        let threads = cuts.len() - 1;
+        for (k, step) in self.steps.iter().enumerate() {
+            let (now, out) = if k % 2 == 0 { (&*a, &mut *b) } else { (&*b, &mut *a) };
+            // each gap in as many pieces as keep all threads busy
+            let pieces: Vec<Range<usize>> = if self.steps.len() == 1 {
+                cuts.windows(2).map(|w| w[0]..w[1]).collect()
+            } else {
+                let gaps = cuts[1..threads].iter().map(|c| c - (k + 1) * lag..c + (k + 1) * lag);
+                let each = threads.div_ceil(threads - 1);
+                gaps.flat_map(|g| {
+                    let cut = move |i: usize| g.start + i * g.len() / each;
+                    (0..each).map(move |i| cut(i)..cut(i + 1)).collect::<Vec<_>>()
+                })
+                .collect()
+            };
+            let mut rest = &mut out[..];
+            let mut at = 0;
+            rayon::scope(|scope| {
+                for p in pieces {
+                    let skip = (p.start * BLOCK - at).min(rest.len());
+                    let skipped = std::mem::take(&mut rest).split_at_mut(skip).1;
+                    let (mine, next) = skipped.split_at_mut((p.len() * BLOCK).min(skipped.len()));
+                    (rest, at) = (next, p.end * BLOCK);
+                    scope.spawn(move |_| self.sweep(step, now, 0, p.start, mine));
+                }
+            });
+        }
+    }
+
+    /// Steps one behind the other on this thread; the fields begin with block `base`, step k takes the blocks of `range(k)`.
+    fn skewed(&self, base: usize, [a, b]: [&mut [[T; 8]]; 2], range: impl Fn(usize) -> Range<usize>) {
+        let rows = a.len();
+        let (n, lag) = (a.len().div_ceil(BLOCK * CHUNK), lag(self.rows.width, BLOCK * CHUNK));
+        let all = n + lag * (self.steps.len() - 1);
+        for head in 0..all {
+            for (k, step) in self.steps.iter().enumerate() {
+                let Some(chunk) = head.checked_sub(k * lag).filter(|c| *c < n) else { continue };
+                let r = range(k);
+                let (from, to) =
+                    ((base + chunk * CHUNK).max(r.start), (base + (chunk + 1) * CHUNK).min(r.end));
+                if from >= to {
+                    continue;
+                }
+                let (now, out) = if k % 2 == 0 { (&*a, &mut *b) } else { (&*b, &mut *a) };
+                let out = &mut out[(from - base) * BLOCK..((to - base) * BLOCK).min(rows)];
+                self.sweep(step, now, base * BLOCK, from, out);
+            }
+        }
+    }
+
+    fn sweep(&self, step: &Step, now: &[[T; 8]], base: usize, first_block: usize, out: &mut [[T; 8]]) {
+        let &Step { add, factors, reach, zero } = step;
+        let sweep = Sweep { rows: self.rows, active: self.active, reach, zero, now, base, factors };
+        if add { sweep.part::<OUT>(first_block, out) } else { sweep.part::<ALONE>(first_block, out) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::made::Made;
+    use crate::smooth::{Diffusion, Graph};
+
+    /// However many go together and on however many threads: the bits of one sweep after the other.
+    #[test]
+    fn sweeps_together_have_the_bits_of_single_ones() {
+        for made in [
+            Made::graded([9, 7, 90], [0.06, 0.04, 0.5]),
+            Made::tet([4, 4, 30], [0.04, 0.04, 0.3]),
+            Made::hex([40, 33, 4], [0.4, 0.33, 0.04]),
+        ] {
+            let mesh = made.mesh();
+            let graph = Graph::new(&mesh, &Diffusion::uniform(0.012).links(&mesh));
+            let occupied: Vec<u32> = (0..mesh.len() as u32).filter(|j| j % 7 == 0 && *j > 900).collect();
+            let m = 9;
+            let mut active = Active::default();
+            active.update(&graph, &occupied, Some(m));
+            let step = |k: usize| Step {
+                add: k % 3 == 2,
+                factors: [0.9, -0.3 / graph.spectrum, 0.0, 0.2],
+                reach: k as u16 + 1,
+                zero: if k == 0 { m as u16 + 1 } else { 0 },
+            };
+            let steps: Vec<Step> = (0..m).map(step).collect();
+            let of = |depth: usize, threads: usize| {
+                let mut fields = [vec![[0.0; 8]; mesh.len()], vec![[f64::NAN; 8]; mesh.len()]];
+                for j in &occupied {
+                    fields[0][graph.row(*j) as usize] = [1.0 + 1e-3 * f64::from(*j); 8];
+                }
+                let [a, b] = &mut fields;
+                let run = || run_by(depth, &graph.rows, &active, &steps, [a, b]);
+                rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(run);
+                let [_, b] = fields;
+                let seen = |b: &[f64; 8]| b.map(f64::to_bits);
+                b.iter().map(seen).collect::<Vec<_>>()
+            };
+            let one = of(1, 1);
+            for (depth, threads) in
+                [(2, 1), (3, 1), (5, 1), (9, 1), (20, 1), (1, 2), (2, 2), (3, 2), (4, 3), (9, 4)]
+            {
+                assert!(of(depth, threads) == one, "{depth} sweeps, {threads} threads");
+            }
+        }
+    }
+}
