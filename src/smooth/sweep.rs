@@ -104,20 +104,19 @@ struct Rest<'a, T: Real, S: Simd, const KIND: u8> {
 }
 
 impl<T: Real, S: Simd, const KIND: u8> Rest<'_, T, S, KIND> {
-    /// (own) x − q far [+ …]; own = p + q A_ii.
+    /// own − q far [+ …].
     #[inline(always)]
     fn result(
         &self,
         k: [T::Of<S>; 4],
         own: T::Of<S>,
-        x: T::Of<S>,
         far: T::Of<S>,
         i: usize,
         lane: usize,
         out: &mut T::Of<S>,
     ) {
         let v = self.v;
-        let mut y = T::sub(v, T::mul(v, own, x), T::mul(v, k[1], far));
+        let mut y = T::sub(v, own, T::mul(v, k[1], far));
         if KIND & OTHER > 0 {
             y = T::add(v, y, T::mul(v, k[2], T::vectors::<S>(&self.other[i])[lane]));
         }
@@ -127,19 +126,24 @@ impl<T: Real, S: Simd, const KIND: u8> Rest<'_, T, S, KIND> {
         *out = y;
     }
 
-    /// p, q, r, s, and p + q A_ii of a row.
+    /// p, q, r, s.
     #[inline(always)]
-    fn factors(&self) -> ([T::Of<S>; 4], impl Fn(T) -> T::Of<S>) {
+    fn factors(&self) -> [T::Of<S>; 4] {
+        self.sweep.factors.map(|x| T::splat(self.v, T::from_f64(x)))
+    }
+
+    /// (p + q A_ii) x.
+    #[inline(always)]
+    fn own(&self, k: [T::Of<S>; 4], d: T, x: T::Of<S>) -> T::Of<S> {
         let v = self.v;
-        let k = self.sweep.factors.map(|x| T::splat(v, T::from_f64(x)));
-        (k, move |d: T| T::add(v, k[0], T::mul(v, k[1], T::splat(v, d))))
+        T::mul(v, T::add(v, k[0], T::mul(v, k[1], T::splat(v, d))), x)
     }
 
     /// Rows of any kind.
     #[inline(always)]
     fn any(self, out: &mut [[T; 8]]) {
         let (s, v, n) = (self.sweep, self.v, out.len());
-        let (k, own) = self.factors();
+        let k = self.factors();
         let starts = &s.rows.start[self.begin..=self.begin + n];
         let range = starts[0] as usize..starts[n] as usize;
         let (mut to, mut a) = (&s.rows.to[range.clone()], &s.rows.a[range]);
@@ -155,7 +159,8 @@ impl<T: Real, S: Simd, const KIND: u8> Rest<'_, T, S, KIND> {
                     let far = T::vectors::<S>(&s.now[*to as usize - s.base])[lane];
                     sum = T::add(v, sum, T::mul(v, T::splat(v, *a), far));
                 }
-                self.result(k, own(d[i]), T::vectors::<S>(&now[i])[lane], sum, i, lane, out);
+                let x = T::vectors::<S>(&now[i])[lane];
+                self.result(k, self.own(k, d[i], x), sum, i, lane, out);
             }
         }
     }
@@ -164,7 +169,7 @@ impl<T: Real, S: Simd, const KIND: u8> Rest<'_, T, S, KIND> {
     #[inline(always)]
     fn line<const N: usize, const W: usize>(self, out: &mut [[T; 8]], offsets: &[i32; LINE]) {
         let (s, v, n) = (self.sweep, self.v, out.len());
-        let (k, own) = self.factors();
+        let k = self.factors();
         let first = s.rows.start[self.begin] as usize;
         let a = &s.rows.a[first..][..N * n].as_chunks::<N>().0[..n];
         let at = self.begin - s.base;
@@ -185,7 +190,8 @@ impl<T: Real, S: Simd, const KIND: u8> Rest<'_, T, S, KIND> {
                     };
                     sum = T::add(v, sum, T::mul(v, T::splat(v, a[i][k]), far));
                 }
-                self.result(k, own(d[i]), x, sum, i, lane, &mut T::vectors_mut::<S>(&mut out[i])[lane]);
+                let own = self.own(k, d[i], x);
+                self.result(k, own, sum, i, lane, &mut T::vectors_mut::<S>(&mut out[i])[lane]);
                 (west, x) = (x, east);
             }
         }
