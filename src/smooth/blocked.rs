@@ -6,6 +6,9 @@
 //! overwrites, the one before no longer needs. On several threads each has its own rows and stays clear of its neighbours' by
 //! one distance more in each sweep; then the gaps between the threads are filled.
 //!
+//! In a block of hexahedra whose layers do not fit into the cache so many times, each layer is cut into strips, taken one after the
+//! other through all layers; a strip moves back by one line from sweep to sweep, so that it needs only what is done.
+//!
 //! Every row is computed as it is without this: how many sweeps go together does not change a bit.
 
 use super::Active;
@@ -32,6 +35,8 @@ pub(super) struct Step {
 /// Blocks that a sweep advances at a time.
 const CHUNK: usize = 16;
 
+/// Sweeps at a time that are worth cutting layers for.
+const TOGETHER: usize = 4;
 /// Share of the cache that rows in flight may take.
 const SHARE: f64 = 0.7;
 
@@ -40,17 +45,19 @@ struct Work<'a, T> {
     rows: &'a Rows<T>,
     active: &'a Active,
     steps: &'a [Step],
+    /// of each layer; 1: whole
+    strips: usize,
 }
 
 /// Runs all steps; the result is in field `steps.len()` mod 2.
 pub(super) fn run<T: Real>(rows: &Rows<T>, active: &Active, steps: &[Step], fields: [&mut [[T; 8]]; 2]) {
     let reach = steps.iter().map(|s| usize::from(s.reach)).max().unwrap_or(0);
-    run_by(depth(rows, active, reach), rows, active, steps, fields);
+    run_by(plan(rows, active, reach, steps.len()), rows, active, steps, fields);
 }
 
-/// With so many sweeps at a time, if the threads' rows allow.
+/// With so many sweeps at a time, if the threads' rows allow, and so many strips.
 fn run_by<T: Real>(
-    depth: usize,
+    (depth, strips): (usize, usize),
     rows: &Rows<T>,
     active: &Active,
     steps: &[Step],
@@ -62,19 +69,28 @@ fn run_by<T: Real>(
     let lag = lag(rows.width, BLOCK).max(1);
     // gaps of the last sweep must not meet
     let most = if cuts.len() > 2 { narrowest / (2 * lag) } else { usize::MAX };
-    let depth = depth.min(most).max(1);
+    // nor may a strip move back by more than its width
+    let wide = if strips > 1 { rows.width / strips / rows.within } else { usize::MAX };
+    let depth = depth.min(most).min(wide).max(1);
     for (k, group) in steps.chunks(depth).enumerate() {
-        let work = Work { rows, active, steps: group };
+        let work = Work { rows, active, steps: group, strips };
         if k * depth % 2 == 0 { work.run(&cuts, a, b) } else { work.run(&cuts, b, a) }
     }
 }
 
-/// How many sweeps' rows fit into the cache.
-fn depth<T>(rows: &Rows<T>, active: &Active, reach: usize) -> usize {
+/// How many sweeps go together so that their rows fit into the cache, and in how many strips.
+fn plan<T>(rows: &Rows<T>, active: &Active, reach: usize, steps: usize) -> (usize, usize) {
     let n = rows.d.len();
     let share = active.rows_within(reach, n) as f64 / n.max(1) as f64;
-    let row = (16 * size_of::<T>() + rows.bytes) as f64;
-    (SHARE * cache() / ((rows.width as f64 * share + (CHUNK * BLOCK) as f64) * row)) as usize
+    let fit = SHARE * cache() / (16 * size_of::<T>() + rows.bytes) as f64;
+    let whole = (fit / (rows.width as f64 * share + (CHUNK * BLOCK) as f64)) as usize;
+    if whole >= TOGETHER || steps < 3 || rows.within == 0 {
+        return (whole, 1);
+    }
+    // strips much wider than they move
+    let strips = (rows.width as f64 * TOGETHER as f64 / fit).ceil() as usize;
+    let strips = strips.min(rows.width / (8 * rows.within));
+    if strips < 2 { (whole, 1) } else { ((fit * strips as f64 / rows.width as f64) as usize, strips) }
 }
 
 /// Pieces of so many rows that a neighbour may be away.
@@ -142,7 +158,7 @@ impl<T: Real> Work<'_, T> {
                     let skipped = std::mem::take(&mut rest).split_at_mut(skip).1;
                     let (mine, next) = skipped.split_at_mut((p.len() * BLOCK).min(skipped.len()));
                     (rest, at) = (next, p.end * BLOCK);
-                    scope.spawn(move |_| self.sweep(step, now, 0, p.start, mine));
+                    scope.spawn(move |_| self.sweep(step, now, 0, p.start * BLOCK, mine));
                 }
             });
         }
@@ -150,29 +166,51 @@ impl<T: Real> Work<'_, T> {
 
     /// Steps one behind the other on this thread; the fields begin with block `base`, step k takes the blocks of `range(k)`.
     fn skewed(&self, base: usize, [a, b]: [&mut [[T; 8]]; 2], range: impl Fn(usize) -> Range<usize>) {
-        let rows = a.len();
-        let (n, lag) = (a.len().div_ceil(BLOCK * CHUNK), lag(self.rows.width, BLOCK * CHUNK));
-        let all = n + lag * (self.steps.len() - 1);
-        for head in 0..all {
-            for (k, step) in self.steps.iter().enumerate() {
-                let Some(chunk) = head.checked_sub(k * lag).filter(|c| *c < n) else { continue };
-                let r = range(k);
-                let (from, to) =
-                    ((base + chunk * CHUNK).max(r.start), (base + (chunk + 1) * CHUNK).min(r.end));
-                if from >= to {
-                    continue;
-                }
+        let (first, end) = (base * BLOCK, base * BLOCK + a.len());
+        let mut go = |k: usize, rows: Range<usize>| {
+            let r = range(k);
+            let from = rows.start.max(r.start * BLOCK).max(first);
+            let to = rows.end.min(r.end * BLOCK).min(end);
+            if from < to {
                 let (now, out) = if k % 2 == 0 { (&*a, &mut *b) } else { (&*b, &mut *a) };
-                let out = &mut out[(from - base) * BLOCK..((to - base) * BLOCK).min(rows)];
-                self.sweep(step, now, base * BLOCK, from, out);
+                self.sweep(&self.steps[k], now, first, from, &mut out[from - first..to - first]);
+            }
+        };
+        let steps = 0..self.steps.len();
+        if self.strips < 2 {
+            let chunk = BLOCK * CHUNK;
+            let (n, lag) = ((end - first).div_ceil(chunk), lag(self.rows.width, chunk));
+            for head in 0..n + lag * (steps.len() - 1) {
+                for k in steps.clone() {
+                    if let Some(i) = head.checked_sub(k * lag).filter(|i| *i < n) {
+                        go(k, first + i * chunk..first + (i + 1) * chunk);
+                    }
+                }
+            }
+            return;
+        }
+        let layer = self.rows.width;
+        let (low, high) = (first / layer, end.div_ceil(layer));
+        for strip in 0..self.strips {
+            // the row where a strip of a layer begins; the first strip begins with the layer, the last ends with it
+            let edge = |strip: usize, number: usize, k: usize| {
+                let moved = if strip == 0 || strip == self.strips { 0 } else { k * self.rows.within };
+                number * layer + strip * layer / self.strips - moved
+            };
+            for head in low..high + steps.len() - 1 {
+                for k in steps.clone() {
+                    if let Some(number) = head.checked_sub(k).filter(|l| (low..high).contains(l)) {
+                        go(k, edge(strip, number, k)..edge(strip + 1, number, k));
+                    }
+                }
             }
         }
     }
 
-    fn sweep(&self, step: &Step, now: &[[T; 8]], base: usize, first_block: usize, out: &mut [[T; 8]]) {
+    fn sweep(&self, step: &Step, now: &[[T; 8]], base: usize, first: usize, out: &mut [[T; 8]]) {
         let &Step { add, factors, reach, zero } = step;
         let sweep = Sweep { rows: self.rows, active: self.active, reach, zero, now, base, factors };
-        if add { sweep.part::<OUT>(first_block, out) } else { sweep.part::<ALONE>(first_block, out) }
+        if add { sweep.part::<OUT>(first, out) } else { sweep.part::<ALONE>(first, out) }
     }
 }
 
@@ -185,10 +223,12 @@ mod tests {
     /// However many go together and on however many threads: the bits of one sweep after the other.
     #[test]
     fn sweeps_together_have_the_bits_of_single_ones() {
+        let mut stripped = 0;
         for made in [
             Made::graded([9, 7, 90], [0.06, 0.04, 0.5]),
             Made::tet([4, 4, 30], [0.04, 0.04, 0.3]),
             Made::hex([40, 33, 4], [0.4, 0.33, 0.04]),
+            Made::graded([9, 200, 7], [0.06, 1.2, 0.05]),
         ] {
             let mesh = made.mesh();
             let graph = Graph::new(&mesh, &Diffusion::uniform(0.012).links(&mesh));
@@ -203,7 +243,7 @@ mod tests {
                 zero: if k == 0 { m as u16 + 1 } else { 0 },
             };
             let steps: Vec<Step> = (0..m).map(step).collect();
-            let of = |depth: usize, threads: usize| {
+            let of = |depth: (usize, usize), threads: usize| {
                 let mut fields = [vec![[0.0; 8]; mesh.len()], vec![[f64::NAN; 8]; mesh.len()]];
                 for j in &occupied {
                     fields[0][graph.row(*j) as usize] = [1.0 + 1e-3 * f64::from(*j); 8];
@@ -215,12 +255,18 @@ mod tests {
                 let seen = |b: &[f64; 8]| b.map(f64::to_bits);
                 b.iter().map(seen).collect::<Vec<_>>()
             };
-            let one = of(1, 1);
+            let one = of((1, 1), 1);
             for (depth, threads) in
                 [(2, 1), (3, 1), (5, 1), (9, 1), (20, 1), (1, 2), (2, 2), (3, 2), (4, 3), (9, 4)]
             {
-                assert!(of(depth, threads) == one, "{depth} sweeps, {threads} threads");
+                assert!(of((depth, 1), threads) == one, "{depth} sweeps, {threads} threads");
+                for strips in [2, 3].iter().filter(|_| graph.rows.within > 0) {
+                    let what = format!("{depth} sweeps, {threads} threads, {strips} strips");
+                    assert!(of((depth, *strips), threads) == one, "{what}");
+                    stripped += 1;
+                }
             }
         }
+        assert!(stripped > 0);
     }
 }

@@ -33,6 +33,16 @@ impl Factor {
             Self::Pair { .. } => 2,
         }
     }
+    /// Sum of the sizes of the terms that a row adds up, for values of size 1 (A_ii at most half the spectrum): they cancel
+    /// where the field is smooth.
+    fn terms(&self) -> f64 {
+        match *self {
+            Self::Real { root } => 1.0 + 2.0 / (1.0 - root).abs(),
+            Self::Pair { real: u, imaginary: v } => {
+                1.0 + 4.0 * (1.0 + (1.0 - u).abs()) / ((1.0 - u).powi(2) + v * v)
+            }
+        }
+    }
     /// At X.
     pub fn value(&self, x: f64) -> f64 {
         match *self {
@@ -90,12 +100,11 @@ pub fn factors(kind: Kind, c: &[f64], tolerance: f64) -> Option<Vec<Factor>> {
         product = times(&product, &order[order.len() - 1]);
     }
     let gap = points.iter().zip(&product).map(|(x, p)| (p - coefficients::value(kind, c, *x)).abs());
-    // what is rounded before a factor is multiplied by all that follow
+    // what is rounded in a factor is multiplied by all that follow
     let (mut after, mut growth) = (one.clone(), 0.0f64);
     for (f, before) in order.iter().zip(&before).rev() {
-        growth = growth.max(largest(&after));
+        growth = growth.max(before * f.terms() * largest(&after));
         after = times(&after, f);
-        growth = growth.max(before * largest(&after));
     }
     (gap.fold(0.0, f64::max) <= SHARE * tolerance && growth <= GROWTH).then_some(order)
 }

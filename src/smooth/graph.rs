@@ -26,6 +26,9 @@ pub struct Rows<T> {
     pub(super) first_run: Vec<u32>,
     /// largest distance of a neighbour, rows
     pub(super) width: usize,
+    /// where rows lie in layers of `width` rows, as in a block of hexahedra: largest distance of a neighbour in the same layer;
+    /// else 0
+    pub(super) within: usize,
     /// mean size of a row, bytes
     pub(super) bytes: usize,
 }
@@ -220,10 +223,18 @@ impl<T: Real> Rows<T> {
         let first_run = first_run.collect();
         let own = |w: &[u32]| T::from_f64(a[w[0] as usize..w[1] as usize].iter().map(|a| a.to_f64()).sum());
         let d = start.windows(2).map(own).collect();
-        let far = |(i, w): (usize, &[u32])| {
-            to[w[0] as usize..w[1] as usize].iter().map(|j| j.abs_diff(i as u32)).max().unwrap_or(0)
+        let links = || {
+            let of = |(i, w): (usize, &[u32])| (i, w[0] as usize..w[1] as usize);
+            start
+                .windows(2)
+                .enumerate()
+                .map(of)
+                .flat_map(|(i, r)| to[r].iter().map(move |j| (i, *j as usize)))
         };
-        let width = start.windows(2).enumerate().map(far).max().unwrap_or(0) as usize;
+        let width = links().map(|(i, j)| i.abs_diff(j)).max().unwrap_or(0);
+        let near = |l: &(usize, usize)| l.0.abs_diff(l.1) < width;
+        let layered = links().filter(near).all(|(i, j)| i / width == j / width);
+        let within = links().filter(near).map(|(i, j)| i.abs_diff(j)).max().filter(|_| layered).unwrap_or(0);
         let (mut begin, mut bytes) = (0, 0);
         for run in &runs {
             let (end, entries) = (run.end as usize, (start[run.end as usize] - start[begin]) as usize);
@@ -231,7 +242,7 @@ impl<T: Real> Rows<T> {
             begin = end;
         }
         bytes /= begin.max(1);
-        Self { start, to, a, d, runs, first_run, width, bytes }
+        Self { start, to, a, d, runs, first_run, width, within, bytes }
     }
     /// Every row by its indices.
     #[cfg(test)]

@@ -26,7 +26,7 @@ pub(super) struct Sweep<'a, T> {
     pub zero: u16,
     /// x, from row `base` on
     pub now: &'a [[T; 8]],
-    /// a multiple of `BLOCK`
+    /// see `now`
     pub base: usize,
     /// p, q, r, s
     pub factors: [f64; 4],
@@ -44,7 +44,8 @@ pub(super) const BOTH: u8 = 3;
 /// A sweep over the rows of one thread.
 struct Part<'a, T, const KIND: u8> {
     sweep: &'a Sweep<'a, T>,
-    first_block: usize,
+    /// row of out[0]
+    first: usize,
     other: &'a [[T; 8]],
     out: &'a mut [[T; 8]],
 }
@@ -53,23 +54,27 @@ impl<T: Real, const KIND: u8> WithSimd for Part<'_, T, KIND> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, v: S) {
-        let Self { sweep: s, first_block, other, out } = self;
-        let blocks = &s.active.blocks[first_block..][..out.len().div_ceil(BLOCK)];
-        let mut b = 0;
-        while b < blocks.len() {
+        let Self { sweep: s, first, other, out } = self;
+        let size = out.len();
+        let (mut b, last) = (first / BLOCK, (first + size).div_ceil(BLOCK));
+        while b < last {
             // blocks of a kind that follow each other
-            let live = blocks[b] <= s.reach;
-            let same = blocks[b..].iter().take_while(|r| (**r <= s.reach) == live).count();
-            let rows = b * BLOCK..out.len().min((b + same) * BLOCK);
+            let live = s.active.blocks[b] <= s.reach;
+            let same = s.active.blocks[b..last].iter().take_while(|r| (**r <= s.reach) == live).count();
+            let rows =
+                |b: usize, n: usize| (b * BLOCK).saturating_sub(first)..size.min((b + n) * BLOCK - first);
             if live {
-                let mut begin = first_block * BLOCK + rows.start;
-                let end = first_block * BLOCK + rows.end;
+                let rows = rows(b, same);
+                let (mut begin, end) = (first + rows.start, first + rows.end);
                 let mut out = &mut out[rows];
-                for run in &s.rows.runs[s.rows.first_run[first_block + b] as usize..] {
+                for run in &s.rows.runs[s.rows.first_run[b] as usize..] {
                     if begin >= end {
                         break;
                     }
-                    let n = end.min(run.end as usize) - begin;
+                    let n = end.min(run.end as usize).saturating_sub(begin);
+                    if n == 0 {
+                        continue;
+                    }
                     let (mine, rest) = out.split_at_mut(n);
                     out = rest;
                     let other = if KIND & OTHER > 0 { &other[begin..][..n] } else { &[] };
@@ -84,10 +89,9 @@ impl<T: Real, const KIND: u8> WithSimd for Part<'_, T, KIND> {
                     begin += n;
                 }
             } else {
-                for (b, out) in (b..).zip(out[rows].chunks_mut(BLOCK)) {
-                    if blocks[b] <= s.zero {
-                        out.fill([T::ZERO; 8]);
-                    }
+                for b in (b..b + same).filter(|b| s.active.blocks[*b] <= s.zero) {
+                    let rows = rows(b, 1);
+                    out[rows].fill([T::ZERO; 8]);
                 }
             }
             b += same;
@@ -199,14 +203,14 @@ impl<T: Real, S: Simd, const KIND: u8> Rest<'_, T, S, KIND> {
 }
 
 impl<T: Real> Sweep<'_, T> {
-    /// Runs it on this thread, on the rows of `out`, which begins with `first_block`.
-    pub(super) fn part<const KIND: u8>(&self, first_block: usize, out: &mut [[T; 8]]) {
-        T::dispatch(Part::<T, KIND> { sweep: self, first_block, other: &[], out });
+    /// Runs it on this thread, on the rows of `out`, which begins with row `first`.
+    pub(super) fn part<const KIND: u8>(&self, first: usize, out: &mut [[T; 8]]) {
+        T::dispatch(Part::<T, KIND> { sweep: self, first, other: &[], out });
     }
 
     /// Runs it on every thread of the pool; `cuts`: first block of each thread and the end.
     pub(super) fn run<const KIND: u8>(&self, cuts: &[usize], other: &[[T; 8]], mut out: &mut [[T; 8]]) {
-        let part = |first_block, out| T::dispatch(Part::<T, KIND> { sweep: self, first_block, other, out });
+        let part = |first, out| T::dispatch(Part::<T, KIND> { sweep: self, first, other, out });
         if cuts.len() == 2 {
             return part(0, out);
         }
@@ -216,7 +220,7 @@ impl<T: Real> Sweep<'_, T> {
                 let rows = ((w[1] - w[0]) * BLOCK).min(out.len());
                 let (mine, rest) = std::mem::take(&mut out).split_at_mut(rows);
                 out = rest;
-                let first = w[0];
+                let first = w[0] * BLOCK;
                 scope.spawn(move |_| part(first, mine));
             }
         });
