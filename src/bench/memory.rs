@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Memory of a process that does what the coupler does: mesh, particles, fluid, the step and its smoothers.
 //!
-//! Largest resident size from /proc/self/status (kernel's `VmHWM`), two steps of `bench::step`, in three sizes one after
-//! the other, each larger than the last so that what was freed is used again. Bytes per cell and per particle follow from
-//! the differences; the mesh is assembled from its pieces in there, as in a run.
+//! Largest resident size from /proc/self/status (kernel's `VmHWM`), two steps of `bench::step`, in four sizes one after
+//! the other, each larger than the last so that what was freed is used again. Bytes per particle follow from the two with few
+//! cells, bytes per cell from the two with few particles; the mesh is assembled from its pieces in there, as in a run.
 
 use super::{scene, step};
 use serde::Serialize;
@@ -44,9 +44,10 @@ pub fn run(part: usize) -> Result<Memory, String> {
         })?;
         Ok::<_, String>((peak() - base_bytes, particles as f64 / part as f64, cost.cells as f64))
     };
-    let (small, _, few) = measure(33_200, 166_000)?;
-    let (cells, p, many) = measure(33_200, 664_000)?;
-    let (particles, q, _) = measure(664_000, 664_000)?;
-    let bytes_per_cell = (cells - small) / (many - few);
-    Ok(Memory { bytes_per_cell, bytes_per_particle: (particles - cells) / (q - p), base_bytes })
+    let (few, p, _) = measure(33_200, 16_600)?;
+    let (crowd, q, _) = measure(332_000, 16_600)?;
+    let (small, _, m) = measure(33_200, 166_000)?;
+    let (large, _, n) = measure(33_200, 664_000)?;
+    let (bytes_per_cell, bytes_per_particle) = ((large - small) / (n - m), (crowd - few) / (q - p));
+    Ok(Memory { bytes_per_cell, bytes_per_particle, base_bytes })
 }

@@ -74,7 +74,7 @@ fn run_by<T: Real>(
     let depth = depth.min(most).min(wide).max(1);
     for (k, group) in steps.chunks(depth).enumerate() {
         let work = Work { rows, active, steps: group, strips };
-        if k * depth % 2 == 0 { work.run(&cuts, a, b) } else { work.run(&cuts, b, a) }
+        if (k * depth).is_multiple_of(2) { work.run(&cuts, a, b) } else { work.run(&cuts, b, a) }
     }
 }
 
@@ -137,7 +137,7 @@ impl<T: Real> Work<'_, T> {
         }
         let threads = cuts.len() - 1;
         for (k, step) in self.steps.iter().enumerate() {
-            let (now, out) = if k % 2 == 0 { (&*a, &mut *b) } else { (&*b, &mut *a) };
+            let (now, out) = if k.is_multiple_of(2) { (&*a, &mut *b) } else { (&*b, &mut *a) };
             // each gap in as many pieces as keep all threads busy
             let pieces: Vec<Range<usize>> = if self.steps.len() == 1 {
                 cuts.windows(2).map(|w| w[0]..w[1]).collect()
@@ -172,7 +172,7 @@ impl<T: Real> Work<'_, T> {
             let from = rows.start.max(r.start * BLOCK).max(first);
             let to = rows.end.min(r.end * BLOCK).min(end);
             if from < to {
-                let (now, out) = if k % 2 == 0 { (&*a, &mut *b) } else { (&*b, &mut *a) };
+                let (now, out) = if k.is_multiple_of(2) { (&*a, &mut *b) } else { (&*b, &mut *a) };
                 self.sweep(&self.steps[k], now, first, from, &mut out[from - first..to - first]);
             }
         };
