@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! What the mappings cost and what they are worth: `cargo run --release --example mappings -- [cost|error|kernel|bed]`.
+//! What the mappings cost and what they are worth: `cargo run --release --example mappings -- [cost|error|bed]`.
 //!
 //! cost: µs per particle, cell-sorted, in a box of cells of 2.25 mm with particles of 1.2 mm. error: solid fraction against
-//! the exact Gaussian of the particles, on many meshes, by exp(Δ_T) and by forward-euler. kernel: second moments of a point's
-//! field on tetrahedra. bed: plane-averaged solid fraction of the settled bed of cases/fluidised-bed on the meshes A to E of
-//! Sun & Xiao 2015, table 2.
+//! the exact Gaussian of the particles, on many meshes, by exp(Δ_T) and by forward-euler. bed: plane-averaged
+//! solid fraction of the settled bed of cases/fluidised-bed on the meshes A to E of Sun & Xiao 2015, table 2.
 
 use std::sync::Arc;
 use std::time::Instant;
 use voidage::bench::gauss::Lattice;
 use voidage::locate::Locator;
 use voidage::map::{self, Kernel, Linear, Mapping, Options, ParticleCentroid, Weights};
-use voidage::mesh::made::{Made, Shape};
+use voidage::mesh::made::Made;
 use voidage::mesh::{Mesh, NONE};
 use voidage::smooth::{self, Active, Diffusion, Direction, Field, Graph, Scratch};
 
@@ -152,6 +151,7 @@ fn error() {
         ("tet mirrored", Made::tet([6; 3], side(6, 6.0)).mirrored(), false),
     ] {
         let mesh = made.mesh();
+        let lattice = Lattice::of_mesh(&mesh);
         let links = if straight { cosines(&mesh) } else { mesh.clone() };
         for packed in [false, true] {
             let mut position = spheres(&made, packed);
@@ -164,11 +164,9 @@ fn error() {
                     m.weights(&mesh, &position, &radius, &host, &mut w);
                     deposit(&mesh, &w, &volume)
                 };
-                let exact = match Lattice::of_mesh(&mesh) {
-                    Some(lattice) if made.shape == Shape::Hex => {
-                        lattice.solid_fraction(&position, |_| 1.0, |_| b)
-                    }
-                    _ => field(&mut Kernel::default()),
+                let exact = match &lattice {
+                    Some(lattice) => lattice.solid_fraction(&position, |_| 1.0, |_| b),
+                    None => field(&mut Kernel::default()),
                 };
                 let mut linear = Linear::default();
                 let (centroid, deposited) = (field(&mut ParticleCentroid), field(&mut linear));
@@ -191,33 +189,6 @@ fn error() {
                     of(gap(None, EULER, &deposited)),
                 );
             }
-        }
-    }
-}
-
-/// Second moments of the field of one cell ÷ b²/2, mean over the tetrahedra in the middle of a box.
-fn kernel() {
-    for (name, made) in [
-        ("tet", Made::tet([10; 3], [10.0 * 6f64.cbrt(); 3])),
-        ("tet mirrored", Made::tet([10; 3], [10.0 * 6f64.cbrt(); 3]).mirrored()),
-    ] {
-        let mesh = made.mesh();
-        let middle = 0.5 * made.size[0];
-        let near = |j: &usize| mesh.centre[*j].iter().all(|x| (x - middle).abs() < 1.4);
-        let sources: Vec<usize> = (0..mesh.len()).filter(near).collect();
-        for b in [2.0, 4.0] {
-            let mut moment = [[0.0; 3]; 3];
-            for j in &sources {
-                let mut phi = vec![0.0; mesh.len()];
-                phi[*j] = 1.0 / mesh.volume[*j];
-                let out = smooth(&mesh, b, None, EXACT, &phi);
-                for (i, p) in out.iter().enumerate() {
-                    let d = [0, 1, 2].map(|a| mesh.centre[i][a] - mesh.centre[*j][a]);
-                    let m = p * mesh.volume[i] / sources.len() as f64 / (0.5 * b * b);
-                    (0..3).for_each(|a| (0..3).for_each(|c| moment[a][c] += m * d[a] * d[c]));
-                }
-            }
-            println!("{name:13} b/h {b}: {} sources, moments {moment:.3?}", sources.len());
         }
     }
 }
@@ -301,7 +272,7 @@ fn bed() {
 
 fn main() {
     let what = std::env::args().nth(1).unwrap_or_default();
-    for (name, run) in [("cost", cost as fn()), ("error", error), ("kernel", kernel), ("bed", bed)] {
+    for (name, run) in [("cost", cost as fn()), ("error", error), ("bed", bed)] {
         if what.is_empty() || what == name {
             run();
         }

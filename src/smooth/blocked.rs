@@ -16,6 +16,7 @@ use super::active::BLOCK;
 use super::graph::Rows;
 use super::real::Real;
 use super::sweep::{ALONE, OUT, Sweep, cuts};
+use crate::threads;
 use std::ops::Range;
 use std::sync::OnceLock;
 
@@ -51,8 +52,7 @@ struct Work<'a, T> {
 
 /// Runs all steps; the result is in field `steps.len()` mod 2.
 pub(super) fn run<T: Real>(rows: &Rows<T>, active: &Active, steps: &[Step], fields: [&mut [[T; 8]]; 2]) {
-    let reach = steps.iter().map(|s| usize::from(s.reach)).max().unwrap_or(0);
-    run_by(plan(rows, active, reach, steps.len()), rows, active, steps, fields);
+    run_by(plan(rows, active, steps.len()), rows, active, steps, fields);
 }
 
 /// With so many sweeps at a time, if the threads' rows allow, and so many strips.
@@ -63,8 +63,7 @@ fn run_by<T: Real>(
     steps: &[Step],
     [a, b]: [&mut [[T; 8]]; 2],
 ) {
-    let reach = steps.iter().map(|s| usize::from(s.reach)).max().unwrap_or(0);
-    let cuts = cuts(active, reach);
+    let cuts = cuts(active, steps.len());
     let narrowest = cuts.windows(2).map(|w| w[1] - w[0]).min().unwrap_or(0);
     let lag = lag(rows.width, BLOCK).max(1);
     // gaps of the last sweep must not meet
@@ -78,10 +77,10 @@ fn run_by<T: Real>(
     }
 }
 
-/// How many sweeps go together so that their rows fit into the cache, and in how many strips.
-fn plan<T>(rows: &Rows<T>, active: &Active, reach: usize, steps: usize) -> (usize, usize) {
+/// How many of so many sweeps go together so that their rows fit into the cache, and in how many strips.
+fn plan<T>(rows: &Rows<T>, active: &Active, steps: usize) -> (usize, usize) {
     let n = rows.d.len();
-    let share = active.rows_within(reach, n) as f64 / n.max(1) as f64;
+    let share = active.rows_within(steps, n) as f64 / n.max(1) as f64;
     let fit = SHARE * cache() / (16 * size_of::<T>() + rows.bytes) as f64;
     let whole = (fit / (rows.width as f64 * share + (CHUNK * BLOCK) as f64)) as usize;
     if whole >= TOGETHER || steps < 3 || rows.within == 0 {
@@ -116,50 +115,34 @@ impl<T: Real> Work<'_, T> {
             return self.skewed(0, [a, b], |_| 0..blocks);
         }
         let lag = lag(self.rows.width, BLOCK);
-        // one sweep at a time: no gaps, the fields are shared
-        if self.steps.len() > 1 {
-            let (mut rest_a, mut rest_b) = (&mut *a, &mut *b);
-            rayon::scope(|scope| {
-                for w in cuts.windows(2) {
-                    let rows = ((w[1] - w[0]) * BLOCK).min(rest_a.len());
-                    let (mine_a, next_a) = std::mem::take(&mut rest_a).split_at_mut(rows);
-                    let (mine_b, next_b) = std::mem::take(&mut rest_b).split_at_mut(rows);
-                    (rest_a, rest_b) = (next_a, next_b);
-                    let (low, high) = (w[0], w[1]);
-                    let range = move |step: usize| {
-                        let clear = (step + 1) * lag;
-                        let from = if low == 0 { 0 } else { low + clear };
-                        from..if high == blocks { high } else { high - clear }
-                    };
-                    scope.spawn(move |_| self.skewed(low, [mine_a, mine_b], range));
-                }
-            });
+        if let [step] = self.steps {
+            let sweep = self.of(step, a, 0);
+            return if step.add { sweep.run::<OUT>(cuts, &[], b) } else { sweep.run::<ALONE>(cuts, &[], b) };
         }
+        let rows = a.len();
+        let ends = || cuts[1..].iter().map(|c| (c * BLOCK).min(rows));
+        let parts = threads::cut(a, ends()).into_iter().zip(threads::cut(b, ends()));
+        threads::map(cuts.windows(2).zip(parts).collect(), |(w, (a, b))| {
+            let clear = |step: usize| (step + 1) * lag;
+            let from = |step| if w[0] == 0 { 0 } else { w[0] + clear(step) };
+            let to = |step| if w[1] == blocks { blocks } else { w[1] - clear(step) };
+            self.skewed(w[0], [a, b], |step| from(step)..to(step));
+        });
+        // each gap in as many pieces as keep all threads busy
         let threads = cuts.len() - 1;
+        let each = threads.div_ceil(threads - 1);
         for (k, step) in self.steps.iter().enumerate() {
-            let (now, out) = if k.is_multiple_of(2) { (&*a, &mut *b) } else { (&*b, &mut *a) };
-            // each gap in as many pieces as keep all threads busy
-            let pieces: Vec<Range<usize>> = if self.steps.len() == 1 {
-                cuts.windows(2).map(|w| w[0]..w[1]).collect()
-            } else {
-                let gaps = cuts[1..threads].iter().map(|c| c - (k + 1) * lag..c + (k + 1) * lag);
-                let each = threads.div_ceil(threads - 1);
-                gaps.flat_map(|g| {
-                    let cut = move |i: usize| g.start + i * g.len() / each;
-                    (0..each).map(move |i| cut(i)..cut(i + 1)).collect::<Vec<_>>()
-                })
-                .collect()
-            };
-            let mut rest = &mut out[..];
-            let mut at = 0;
-            rayon::scope(|scope| {
-                for p in pieces {
-                    let skip = (p.start * BLOCK - at).min(rest.len());
-                    let skipped = std::mem::take(&mut rest).split_at_mut(skip).1;
-                    let (mine, next) = skipped.split_at_mut((p.len() * BLOCK).min(skipped.len()));
-                    (rest, at) = (next, p.end * BLOCK);
-                    scope.spawn(move |_| self.sweep(step, now, 0, p.start * BLOCK, mine));
-                }
+            let (now, out) = turn(k, &mut *a, &mut *b);
+            let half = (k + 1) * lag;
+            let pieces = cuts[1..threads].iter().flat_map(|c| {
+                let edge = move |i: usize| c - half + i * 2 * half / each;
+                (0..each).map(move |i| edge(i)..edge(i + 1))
+            });
+            let pieces: Vec<Range<usize>> = pieces.collect();
+            let ends = pieces.iter().flat_map(|p| [p.start * BLOCK, (p.end * BLOCK).min(now.len())]);
+            let parts = threads::cut(out, ends).into_iter().skip(1).step_by(2);
+            threads::map(pieces.iter().zip(parts).collect(), |(p, out)| {
+                self.sweep(step, now, 0, p.start * BLOCK, out);
             });
         }
     }
@@ -172,7 +155,7 @@ impl<T: Real> Work<'_, T> {
             let from = rows.start.max(r.start * BLOCK).max(first);
             let to = rows.end.min(r.end * BLOCK).min(end);
             if from < to {
-                let (now, out) = if k.is_multiple_of(2) { (&*a, &mut *b) } else { (&*b, &mut *a) };
+                let (now, out) = turn(k, &mut *a, &mut *b);
                 self.sweep(&self.steps[k], now, first, from, &mut out[from - first..to - first]);
             }
         };
@@ -207,11 +190,21 @@ impl<T: Real> Work<'_, T> {
         }
     }
 
-    fn sweep(&self, step: &Step, now: &[[T; 8]], base: usize, first: usize, out: &mut [[T; 8]]) {
-        let &Step { add, factors, reach, zero } = step;
-        let sweep = Sweep { rows: self.rows, active: self.active, reach, zero, now, base, factors };
-        if add { sweep.part::<OUT>(first, out) } else { sweep.part::<ALONE>(first, out) }
+    /// A step as a sweep; `now` begins with row `base`.
+    fn of<'b>(&'b self, step: &Step, now: &'b [[T; 8]], base: usize) -> Sweep<'b, T> {
+        let &Step { factors, reach, zero, .. } = step;
+        Sweep { rows: self.rows, active: self.active, reach, zero, now, base, factors }
     }
+
+    fn sweep(&self, step: &Step, now: &[[T; 8]], base: usize, first: usize, out: &mut [[T; 8]]) {
+        let sweep = self.of(step, now, base);
+        if step.add { sweep.part::<OUT>(first, out) } else { sweep.part::<ALONE>(first, out) }
+    }
+}
+
+/// What sweep k of a group reads and writes.
+fn turn<'a, T>(k: usize, a: &'a mut [[T; 8]], b: &'a mut [[T; 8]]) -> (&'a [[T; 8]], &'a mut [[T; 8]]) {
+    if k.is_multiple_of(2) { (a, b) } else { (b, a) }
 }
 
 #[cfg(test)]

@@ -52,9 +52,10 @@ pub(super) struct Run {
 }
 
 impl Run {
-    /// Bytes that a row with so many neighbours takes, in numbers of so many bytes.
-    fn bytes(&self, entries: usize, size: usize) -> usize {
-        if self.entries > 0 { size * (1 + entries) } else { 4 + size + (size + 4) * entries }
+    /// Bytes that so many of its rows with so many neighbours in all take, in numbers of so many bytes.
+    fn bytes(&self, rows: usize, entries: usize, size: usize) -> usize {
+        let index = if self.entries > 0 { 0 } else { 4 };
+        (size + index) * (rows + entries)
     }
 }
 
@@ -125,7 +126,7 @@ impl Graph {
         let row_of = inverse(&order);
         let far = |row: &dyn Fn(u32) -> u32| {
             let gap = |(i, l): (u32, u32)| f64::from(row(i).abs_diff(row(l)));
-            plain.links().map(gap).sum::<f64>()
+            links(&plain.rows.start, &plain.rows.to).map(gap).sum::<f64>()
         };
         if far(&|i| i) <= WORTH_IT * far(&|i| row_of[i as usize]) {
             return plain;
@@ -152,11 +153,11 @@ impl Graph {
             start.push(to.len() as u32);
         }
         let rows = Rows::new(start, to, a);
-        let d = rows.d.clone();
-        let mut graph = Self { rows, order, spectrum: 0.0, diagonal: 0.0 };
-        graph.spectrum = graph.links().map(|(i, j)| d[i as usize] + d[j as usize]).fold(0.0, f64::max);
-        graph.diagonal = d.iter().copied().fold(0.0, f64::max);
-        graph
+        let d = &rows.d;
+        let both = |(i, j): (u32, u32)| d[i as usize] + d[j as usize];
+        let spectrum = links(&rows.start, &rows.to).map(both).fold(0.0, f64::max);
+        let diagonal = d.iter().copied().fold(0.0, f64::max);
+        Self { rows, order, spectrum, diagonal }
     }
 
     /// Number of cells.
@@ -190,7 +191,7 @@ impl Graph {
                     run += 1;
                 }
                 let entries = (self.rows.start[i + 1] - self.rows.start[i]) as usize;
-                sum += 64 * fields + self.rows.runs[run].bytes(entries, 8);
+                sum += 64 * fields + self.rows.runs[run].bytes(1, entries, 8);
             }
         }
         sum as f64
@@ -204,10 +205,12 @@ impl Graph {
         }
         f64::from(rows) / self.len() as f64
     }
-    /// (row, neighbouring row) of every entry.
-    fn links(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
-        (0..self.len()).flat_map(|i| self.rows.entries(i).0.iter().map(move |j| (i as u32, *j)))
-    }
+}
+
+/// (row, neighbouring row) of every entry.
+fn links<'a>(start: &'a [u32], to: &'a [u32]) -> impl Iterator<Item = (u32, u32)> + 'a {
+    let row = |i: usize| to[start[i] as usize..start[i + 1] as usize].iter().map(move |j| (i as u32, *j));
+    (0..start.len() - 1).flat_map(row)
 }
 
 impl<T: Real> Rows<T> {
@@ -223,22 +226,15 @@ impl<T: Real> Rows<T> {
         let first_run = first_run.collect();
         let own = |w: &[u32]| T::from_f64(a[w[0] as usize..w[1] as usize].iter().map(|a| a.to_f64()).sum());
         let d = start.windows(2).map(own).collect();
-        let links = || {
-            let of = |(i, w): (usize, &[u32])| (i, w[0] as usize..w[1] as usize);
-            start
-                .windows(2)
-                .enumerate()
-                .map(of)
-                .flat_map(|(i, r)| to[r].iter().map(move |j| (i, *j as usize)))
-        };
-        let width = links().map(|(i, j)| i.abs_diff(j)).max().unwrap_or(0);
-        let near = |l: &(usize, usize)| l.0.abs_diff(l.1) < width;
-        let layered = links().filter(near).all(|(i, j)| i / width == j / width);
-        let within = links().filter(near).map(|(i, j)| i.abs_diff(j)).max().filter(|_| layered).unwrap_or(0);
+        let far = |(i, j): (u32, u32)| i.abs_diff(j) as usize;
+        let width = links(&start, &to).map(far).max().unwrap_or(0);
+        let near = || links(&start, &to).filter(|l| far(*l) < width);
+        let layered = near().all(|(i, j)| i as usize / width == j as usize / width);
+        let within = near().map(far).max().filter(|_| layered).unwrap_or(0);
         let (mut begin, mut bytes) = (0, 0);
         for run in &runs {
             let (end, entries) = (run.end as usize, (start[run.end as usize] - start[begin]) as usize);
-            bytes += (end - begin) * run.bytes(entries.div_ceil(end - begin), size_of::<T>());
+            bytes += run.bytes(end - begin, entries, size_of::<T>());
             begin = end;
         }
         bytes /= begin.max(1);
