@@ -34,6 +34,7 @@ pub struct Predicted {
 
 impl Predicted {
     /// What the scheme makes of `before`, with ũ (m/s) of the last step.
+    #[inline(always)]
     pub fn new(scheme: &dyn Scheme, before: &Before, defect: [f64; 3], gathered: [f64; 3]) -> Self {
         let (implicit, explicit) = scheme.predict(before);
         let rest = 1.0 - LEVEL;
@@ -147,6 +148,7 @@ impl Part<'_> {
 }
 
 /// Lanes of Sp (0, kg/s), Su − θ Sp U^n (1–3, N) and K (4, kg/s) of one particle; `period` Δt in s.
+#[inline(always)]
 pub fn linearise(q: &Predicted, ledger: [f64; 3], period: f64) -> [f64; 8] {
     let su = [0, 1, 2].map(|a| -q.implicit * q.known[a] - q.explicit[a] - ledger[a] / period);
     [q.implicit, su[0], su[1], su[2], q.drag_coefficient, 0.0, 0.0, 0.0]

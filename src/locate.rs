@@ -133,8 +133,7 @@ impl Locator {
             }
             // nearly always: strictly inside, no side needs a closer look
             let sides = mesh.sides(cell as usize);
-            let deepest = sides.iter().map(|s| s.beyond(x)).fold(f64::NEG_INFINITY, f64::max);
-            if deepest < 0.0 {
+            if sides.iter().fold(true, |inside, s| inside & (s.beyond(x) < 0.0)) {
                 return Walk::Found(cell);
             }
             let tolerance = BOUNDARY * mesh.volume[cell as usize].cbrt();

@@ -93,12 +93,12 @@ fn four_scenes_are_modelled_differently() {
     assert_eq!(sphere.file.smooth.method, "none", "the case says so");
     // a dilute jet: as little, but in cells that a particle would fill in part; a gas has no memory
     assert_eq!((jet.file.coupling.feedback, jet.file.coupling.model), (Feedback::OneWay, Model::B), "{j}");
-    assert!(jet.file.smooth.method == "chebyshev" && !jet.file.forces.history, "{j}");
+    assert!(jet.file.smooth.method == "gaussian" && !jet.file.forces.history, "{j}");
     assert!((jet.file.smooth.bandwidth / 2e-4 - 1.0).abs() < 1e-9, "four diameters where none is given: {j}");
     // packed and bubbling: both ways, smoothed, with the pressure gradient
     for (c, plan) in [(&packed, &p), (&bed, &b)] {
         assert_eq!((c.file.coupling.feedback, c.file.coupling.model), (Feedback::TwoWay, Model::A), "{plan}");
-        assert!(c.file.smooth.method == "chebyshev" && c.file.forces.pressure_gradient, "{plan}");
+        assert!(c.file.smooth.method == "gaussian" && c.file.forces.pressure_gradient, "{plan}");
     }
     // they differ in what a liquid-like density ratio (1/200) and a gas (1/830) ask for
     assert!(packed.file.forces.history && !bed.file.forces.history, "{p}{b}");

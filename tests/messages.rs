@@ -187,7 +187,7 @@ fn errors() {
             &["smooth.by_diameter = [[0.002, 0.008], [0.001, 0.004]]", "must ascend"],
         ),
         (BED, &[], &["smooth.by_diameter=[[2e-3, -1.0]]"], &["smooth.by_diameter = -1", "a bandwidth"]),
-        (SETTLING, &[], &["smooth.by_diameter=[[2e-3, 8e-3]]"], &["nothing is smoothed", "\"chebyshev\""]),
+        (SETTLING, &[], &["smooth.by_diameter=[[2e-3, 8e-3]]"], &["nothing is smoothed", "\"gaussian\""]),
         (
             BED,
             &[],
@@ -299,7 +299,7 @@ fn warnings() {
             SETTLING,
             &[("particles.in", "diameter 1e-4", "diameter 4e-3")],
             &[],
-            &["smaller than three particle diameters", "smooth.method = \"chebyshev\""],
+            &["smaller than three particle diameters", "smooth.method = \"gaussian\""],
         ),
         (
             SETTLING,

@@ -133,7 +133,7 @@ fn only_what_is_asked_for_is_varied() {
     assert!(t.points.len() > smooth::NAMES.len());
     let t = table(&bytes, 1e-2, vec![Part::Interpolation]);
     assert_eq!(t.points.len(), 3);
-    assert!(t.points.iter().all(|p| p.settings.smoother == "chebyshev"));
+    assert!(t.points.iter().all(|p| p.settings.smoother == smooth::DEFAULT));
     assert!(
         t.to_string().contains("the case") && serde_json::to_string(&t).unwrap().contains("\"numerical\"")
     );

@@ -9,6 +9,7 @@
 use super::{FEEDBACK, HISTORY, LIFT, MODEL, SMOOTHING, SWITCHES, Switch, on, set, setting};
 use crate::config::{Auto, Config, Feedback, Flow, InInterval, Model, Problem, resolution};
 use crate::inspect::{Scene, decide, expected};
+use crate::smooth;
 use std::fmt;
 
 /// What is estimated may be so much larger.
@@ -132,7 +133,7 @@ impl Choosing<'_> {
         let kernel = self.c.file.map.method == "kernel";
         let off = kernel || relative <= self.auto.accuracy;
         let s = &mut self.c.file.smooth;
-        s.method = if off { "none" } else { "chebyshev" }.into();
+        s.method = if off { "none" } else { smooth::DEFAULT }.into();
         let mut setting = format!("{SMOOTHING} = \"{}\"", s.method);
         if !off && s.bandwidth == 0.0 {
             s.bandwidth = b;

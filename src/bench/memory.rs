@@ -38,7 +38,7 @@ pub fn run(part: usize) -> Result<Memory, String> {
             bandwidth: 4.8e-3,
             tolerance: 1e-2,
             drag: "koch-hill",
-            mapping: "particle-centroid",
+            mapping: crate::map::DEFAULT,
             repetitions: 1,
             threads: None,
         })?;

@@ -5,6 +5,7 @@
 //! the same run; absolute times are those of this machine at this moment.
 
 use super::{grid, memory, plot, scaling, scene, smoother, step, triad};
+use crate::map;
 use serde::Serialize;
 
 /// All numbers of one run.
@@ -35,9 +36,9 @@ pub struct Report {
 /// Whole coupling steps: all three passes, from locate to replies ready, Koch–Hill, model A.
 #[derive(Clone, Debug, Serialize)]
 pub struct Steps {
-    /// N_p / N_c = 2
+    /// default mapping, N_p / N_c = 2
     pub us_per_particle_ratio_2: f64,
-    /// N_p / N_c = 16
+    /// default mapping, N_p / N_c = 16
     pub us_per_particle_ratio_16: f64,
     /// every step measured
     pub cases: Vec<step::Cost>,
@@ -105,8 +106,8 @@ pub fn run(quick: bool, mut say: impl FnMut(&str)) -> Result<Report, String> {
         triad_16mb_gb_per_s: triad::bandwidth(16 << 20, 1, 40),
         triad_256mb_gb_per_s: triad::bandwidth(256 << 20, 1, 8),
         mapping: Mapping {
-            divided_us_per_particle: weights(&step.cases[3]),
-            linear_us_per_particle: weights(&step.cases[2]),
+            divided_us_per_particle: weights(&step.cases[4]),
+            linear_us_per_particle: weights(&step.cases[0]),
         },
         step,
         smoother,
@@ -133,9 +134,10 @@ pub fn steps(quick: bool, mut say: impl FnMut(&str)) -> Result<Steps, String> {
     };
     let mut cases = Vec::new();
     for (particles, cells, mapping) in [
+        (332_000, 166_000, map::DEFAULT),
+        (332_640, 20_700, map::DEFAULT),
         (332_000, 166_000, "particle-centroid"),
         (332_640, 20_700, "particle-centroid"),
-        (332_000, 166_000, "linear"),
         (332_000, 166_000, "divided-volume"),
     ] {
         say(&format!("step: {mapping}, {} particles on {} cells", particles / part, cells / part));

@@ -34,7 +34,7 @@ pub fn case(particles: usize, cells: usize, width: f64) -> step::Case {
         bandwidth: width * h,
         tolerance: 1e-2,
         drag: "koch-hill",
-        mapping: "particle-centroid",
+        mapping: crate::map::DEFAULT,
         repetitions: 8,
         threads: None,
     }

@@ -108,7 +108,7 @@ pub fn run(case: &Case) -> Result<Cost, String> {
     let t = smooth::Diffusion::uniform(case.bandwidth).links(&mesh);
     let graph = std::sync::Arc::new(smooth::Graph::new(&mesh, &t));
     let smoother = |name| smooth::on(name, &mesh, &t, &graph, case.tolerance).ok_or("no smoother");
-    let (main, positive) = (smoother("chebyshev")?, smoother("uniformization")?);
+    let (main, positive) = (smoother(smooth::DEFAULT)?, smoother("uniformization")?);
     let (cells, degree) = (mesh.len(), main.degree());
     let mut step = CouplingStep::new(mesh, setup(case.drag)?, mapping, main, positive);
     let mut p = scene::bed(scene::BOX, case.particles, case.diameter);

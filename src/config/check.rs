@@ -161,7 +161,7 @@ fn smoothing(c: &Config, p: &mut Vec<Problem>) {
     let s = &c.file.smooth;
     let given = || format!("{:?}", s.by_diameter);
     if !s.by_diameter.is_empty() && s.method == "none" {
-        let fix = "smooth.method = \"chebyshev\"";
+        let fix = "smooth.method = \"gaussian\"";
         p.push(Problem::error(
             "smooth.by_diameter",
             given(),
@@ -179,7 +179,7 @@ fn smoothing(c: &Config, p: &mut Vec<Problem>) {
         let (accepted, fix) = if x.scheme == "implicit" {
             (
                 "nothing is smoothed with method = \"none\": no void cell has a source",
-                "smooth.method = \"chebyshev\"",
+                "smooth.method = \"gaussian\"",
             )
         } else {
             (
@@ -401,7 +401,7 @@ fn meshes(c: &Config, mesh: &foam::Extent, s: &script::Script, p: &mut Vec<Probl
         let accepted = format!(
             "the cells ({h:.3e} m) are smaller than three particle diameters: the voidage of a cell jumps"
         );
-        let fix = format!("smooth.method = \"chebyshev\" and smooth.bandwidth = {:e}", 8.0 * r);
+        let fix = format!("smooth.method = \"gaussian\" and smooth.bandwidth = {:e}", 8.0 * r);
         p.push(Problem::warning("smooth.method", "none", &accepted, fix));
     }
     let Some((lower, upper)) = s.domain else { return };

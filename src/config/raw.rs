@@ -262,12 +262,12 @@ pub struct Map {
 }
 impl Default for Map {
     fn default() -> Self {
-        Self { method: "particle-centroid".into(), grid: 0.0 }
+        Self { method: map::DEFAULT.into(), grid: 0.0 }
     }
 }
 
-fn chebyshev() -> String {
-    "chebyshev".into()
+fn smoother() -> String {
+    smooth::DEFAULT.into()
 }
 fn tolerance() -> f64 {
     1e-2
@@ -278,7 +278,7 @@ fn tolerance() -> f64 {
 #[serde(deny_unknown_fields)]
 #[allow(missing_docs)]
 pub struct Smooth {
-    #[serde(default = "chebyshev")]
+    #[serde(default = "smoother")]
     pub method: String,
     #[serde(default)]
     pub bandwidth: f64,
@@ -487,16 +487,16 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     (
         "map.method",
         "",
-        "particle-centroid",
-        "particle-centroid | satellite-points (29) | divided-volume (exact overlap) | linear | kernel (Gaussian of \
+        map::DEFAULT,
+        "linear | particle-centroid (SX eq. 4; cheapest) | satellite-points (29) | divided-volume (exact overlap) | kernel (Gaussian of \
          smooth.bandwidth; with smooth.method = none) | two-grid",
     ),
     ("map.grid", "m", "0", "two-grid: cell size of the coarse grid; 2 to 3 particle diameters"),
     (
         "smooth.method",
         "",
-        "chebyshev",
-        "chebyshev | chebyshev-u | uniformization (positive by proof) | forward-euler (positive by proof; nearest to the Gaussian at b/h up to 2) | crank-nicolson | crank-nicolson-1 | backward-euler | constdiff | direct | none",
+        smooth::DEFAULT,
+        "gaussian (forward-euler where it takes no more sweeps than chebyshev, else chebyshev) | chebyshev | chebyshev-u | uniformization (positive by proof) | forward-euler (positive by proof; nearest to the Gaussian at b/h up to 2) | crank-nicolson | crank-nicolson-1 | backward-euler | constdiff | direct | none",
     ),
     (
         "smooth.bandwidth",

@@ -64,7 +64,7 @@ pub fn smoothing(s: &mut Scene, now: bool) {
         to: "solids of a cell",
         how: "6 T/h2, T = b2/4",
         now,
-        on: Some("smooth.method = \"chebyshev\""),
+        on: Some("smooth.method = \"gaussian\""),
         off: Some("smooth.method = \"none\""),
     });
 }
@@ -128,7 +128,7 @@ pub fn advice(s: &Scene, accuracy: f64) -> Vec<String> {
         let noise = s.solid_fraction_seen.mean * (h.mean / d).powi(3) * 6.0 / std::f64::consts::PI;
         if !s.smoothed && h.mean < 3.0 * d {
             list.push(format!(
-                "cells of {:.1} diameters without smoothing: the voidage of a cell jumps with each particle ({noise:.1} in a cell); smooth.method = \"chebyshev\", smooth.bandwidth = {:.1e}",
+                "cells of {:.1} diameters without smoothing: the voidage of a cell jumps with each particle ({noise:.1} in a cell); smooth.method = \"gaussian\", smooth.bandwidth = {:.1e}",
                 h.mean / d,
                 4.0 * d
             ));

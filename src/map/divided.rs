@@ -168,30 +168,24 @@ impl Mapping for DividedVolume {
     }
     fn weights(&self, mesh: &Mesh, position: &[[f64; 3]], radius: &[f64], host: &[u32], out: &mut Weights) {
         assert_eq!(self.cells.len(), mesh.len(), "divided-volume: prepare() it for this mesh first");
-        out.clear();
-        let mut visited: Vec<(u32, V)> = Vec::new();
-        let mut next: Vec<(u32, u32)> = Vec::new();
-        for ((x, r), h) in position.iter().zip(radius).zip(host) {
-            if *h == NONE {
-                out.close();
-                continue;
-            }
-            if !self.cells.warped(*h) && self.cells.depth(*h, *x) >= *r {
-                out.push(*h, 1.0);
-                out.close();
-                continue;
+        type Scratch = (Vec<(u32, V)>, Vec<(u32, u32)>);
+        out.fill(host, |(visited, next): &mut Scratch, i, h, out| {
+            let (x, r) = (position[i], radius[i]);
+            if !self.cells.warped(h) && self.cells.depth(h, x) >= r {
+                out.push(h, 1.0);
+                return out.close();
             }
             let from = out.cell.len();
-            if !self.flood(mesh, *h, *x, *r, &mut visited, &mut next, out) {
+            if !self.flood(mesh, h, x, r, visited, next, out) {
                 out.cell.truncate(from);
                 out.weight.truncate(from);
                 let aside = [0, 1, 2].map(|a| x[a] + r * NUDGE[a]);
-                self.flood(mesh, *h, aside, *r, &mut visited, &mut next, out);
+                self.flood(mesh, h, aside, r, visited, next, out);
             }
             if out.cell.len() == from {
-                out.push(*h, 1.0); // a host found on a warped face by tolerance, a ball smaller than that
+                out.push(h, 1.0); // a host found on a warped face by tolerance, a ball smaller than that
             }
             out.close_scaled();
-        }
+        });
     }
 }

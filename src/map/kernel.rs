@@ -63,18 +63,14 @@ impl Mapping for Kernel {
     fn weights(&self, mesh: &Mesh, position: &[[f64; 3]], _: &[f64], host: &[u32], out: &mut Weights) {
         assert_eq!(self.cells.len(), mesh.len(), "kernel: prepare() it for this mesh first");
         assert!(self.bandwidth > 0.0, "kernel: the bandwidth is {}", self.bandwidth);
-        out.clear();
         let cut = CUT * self.bandwidth;
-        for (x, h) in position.iter().zip(host) {
-            if *h == NONE {
-                out.close();
-                continue;
-            }
+        out.fill(host, |_: &mut (), i, h, out| {
+            let x = position[i];
             // cells within the cut, each with the particle's position as seen from there
-            let mut visited = vec![(*h, *x)];
+            let mut visited = vec![(h, x)];
             let grain = 0.1 * self.bandwidth;
             let key = |c: u32, y: V| (c, [0, 1, 2].map(|a| ((y[a] - x[a]) / grain).round() as i64));
-            let mut seen = HashSet::from([key(*h, *x)]);
+            let mut seen = HashSet::from([key(h, x)]);
             let mut walls: Vec<(V, f64)> = Vec::new();
             let mut i = 0;
             while i < visited.len() {
@@ -123,9 +119,9 @@ impl Mapping for Kernel {
                 }
             }
             if out.cell.len() == *out.start.last().unwrap_or(&0) as usize {
-                out.push(*h, 1.0); // b so small against the cell that no quadrature point sees the Gaussian
+                out.push(h, 1.0); // b so small against the cell that no quadrature point sees the Gaussian
             }
             out.close_scaled();
-        }
+        });
     }
 }

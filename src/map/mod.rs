@@ -9,6 +9,8 @@ mod divided;
 mod fill;
 mod kernel;
 mod linear;
+mod lists;
+mod near;
 mod satellite;
 mod two_grid;
 mod weights;
@@ -20,7 +22,8 @@ pub use linear::Linear;
 pub use satellite::SatellitePoints;
 pub use two_grid::TwoGrid;
 
-pub use weights::Weights;
+pub use near::Lines;
+pub use weights::{BATCH, Weights};
 
 use crate::mesh::Mesh;
 
@@ -74,12 +77,12 @@ impl Mapping for ParticleCentroid {
         "conservative, positive, not continuous; first moment off by up to half a cell; costs nothing"
     }
     fn weights(&self, _: &Mesh, _: &[[f64; 3]], _: &[f64], host: &[u32], out: &mut Weights) {
-        out.start.clear();
-        out.weight.clear();
-        out.cell.clear();
-        out.cell.extend_from_slice(host);
+        out.by_hosts(host);
     }
 }
+
+/// What is used unless another is asked for.
+pub const DEFAULT: &str = "linear";
 
 /// All mappings.
 pub fn all() -> Vec<Box<dyn Mapping>> {

@@ -11,8 +11,8 @@
 
 use super::cells::Cells;
 use super::{Mapping, Options, Weights};
+use crate::mesh::Mesh;
 use crate::mesh::geometry::{add, scale};
-use crate::mesh::{Mesh, NONE};
 
 /// The mapping.
 #[derive(Default)]
@@ -46,32 +46,26 @@ impl Mapping for SatellitePoints {
     }
     fn weights(&self, mesh: &Mesh, position: &[[f64; 3]], radius: &[f64], host: &[u32], out: &mut Weights) {
         assert_eq!(self.cells.len(), mesh.len(), "satellite-points: prepare() it for this mesh first");
-        out.clear();
-        let mut found: Vec<(u32, u32)> = Vec::new();
-        for ((x, r), h) in position.iter().zip(radius).zip(host) {
-            if *h == NONE {
-                out.close();
-                continue;
-            }
+        out.fill(host, |found: &mut Vec<(u32, u32)>, i, h, out| {
+            let (x, r) = (position[i], radius[i]);
             // outermost point 0.9086 R
-            if self.cells.depth(*h, *x) >= 0.9086 * r {
-                out.push(*h, 1.0);
-                out.close();
-                continue;
+            if self.cells.depth(h, x) >= 0.9086 * r {
+                out.push(h, 1.0);
+                return out.close();
             }
             found.clear();
             for p in &self.points {
-                let mut y = add(*x, scale(*p, *r));
-                let cell = self.cells.walk(mesh, *h, &mut y);
+                let mut y = add(x, scale(*p, r));
+                let cell = self.cells.walk(mesh, h, &mut y);
                 match found.iter_mut().find(|f| f.0 == cell) {
                     Some(f) => f.1 += 1,
                     None => found.push((cell, 1)),
                 }
             }
-            for (cell, n) in &found {
+            for (cell, n) in found.iter() {
                 out.push(*cell, f64::from(*n) / self.points.len() as f64);
             }
             out.close();
-        }
+        });
     }
 }

@@ -10,8 +10,8 @@
 
 use super::cells::Cells;
 use super::{Mapping, Options, Weights};
+use crate::mesh::Mesh;
 use crate::mesh::geometry::{V, cross, dot, sub};
-use crate::mesh::{Mesh, NONE};
 
 /// The mapping.
 #[derive(Default)]
@@ -79,19 +79,14 @@ impl Mapping for TwoGrid {
     }
     fn weights(&self, mesh: &Mesh, position: &[[f64; 3]], _: &[f64], host: &[u32], out: &mut Weights) {
         assert_eq!(self.ready, mesh.len(), "two-grid: prepare() it for this mesh first");
-        out.clear();
-        for (x, h) in position.iter().zip(host) {
-            if *h == NONE {
-                out.close();
-                continue;
-            }
-            let i = self.index(*x);
-            let range = self.start[i] as usize..self.start[i + 1] as usize;
+        out.fill(host, |_: &mut (), i, h, out| {
+            let at = self.index(position[i]);
+            let range = self.start[at] as usize..self.start[at + 1] as usize;
             if range.is_empty() {
-                out.push(*h, 1.0);
+                out.push(h, 1.0);
             }
             range.for_each(|k| out.push(self.cell[k], self.share[k]));
             out.close();
-        }
+        });
     }
 }

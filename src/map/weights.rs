@@ -2,15 +2,22 @@
 //! Weights of a mapping, and what is done with them: deposit and gather, adjoint to each other.
 //!
 //! Particle i goes to cell k by m_ik, Σ_k m_ik = 1. Reads and writes cell fields of eight lanes; does not know
-//! what they mean nor where the weights come from.
+//! what they mean nor where the weights come from. All particles of the mapping are stored in one of three ways, by what
+//! is least to read: wholly in their host cells; between eight centres of a block; or cell by cell.
 
+use super::linear::{Fraction, Rings};
+use super::near::Lines;
+use super::{lists, near};
 use crate::arrange::Order;
 use crate::mesh::{Mesh, NONE};
+use crate::smooth::Real;
 use crate::step::Lanes;
 use crate::threads;
+use std::ops::Range;
+use std::sync::Arc;
 
 /// Weights of all particles: particle i goes to `cell[k]` by `weight[k]`, k from `start[i]` to `start[i+1]`; or,
-/// with `start` and `weight` empty, each wholly to its host `cell[i]` (`NONE`: to none).
+/// with `start` and `weight` empty, all by their host `cell[i]` (`NONE`: to none): wholly, or with those around (`near`).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Weights {
     /// first entry of each particle; one more at the end
@@ -19,15 +26,21 @@ pub struct Weights {
     pub cell: Vec<u32>,
     /// m_ik
     pub weight: Vec<f64>,
+    /// the cells around the host, and where each particle lies between the centres (`Rings::eight`)
+    pub(super) near: Option<(Arc<Rings>, Vec<Fraction>)>,
+    /// cells around the occupied ones, where `near` is used
+    around: Vec<u32>,
+    /// lowest and highest cell that each piece of the particles goes to, if it may be another's
+    span: Vec<(u32, u32)>,
 }
 
 impl Weights {
     /// Every particle in one cell?
     #[inline(always)]
     fn whole(&self) -> bool {
-        self.start.is_empty()
+        self.start.is_empty() && self.near.is_none()
     }
-    /// (cell, m) of particle i, for mappings to several cells.
+    /// (cell, m) of particle i, for those stored cell by cell.
     #[inline(always)]
     fn entries(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let range = self.start[i] as usize..self.start[i + 1] as usize;
@@ -35,17 +48,51 @@ impl Weights {
     }
     /// (cell, m_ik) of particle i.
     pub fn of(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let mut list = Vec::with_capacity(8);
+        match &self.near {
+            _ if !self.start.is_empty() => list.extend(self.entries(i)),
+            _ if self.cell[i] == NONE => (),
+            Some((rings, fraction)) => {
+                let (cell, m) = rings.eight(self.cell[i], fraction[i]);
+                list.extend(cell.into_iter().map(|c| c as usize).zip(m).filter(|e| e.1 > 0.0));
+            }
+            None => list.push((self.cell[i] as usize, 1.0)),
+        }
+        list.into_iter()
+    }
+    /// Once the weights are complete: what deposits and smoothers want to know of them beforehand.
+    pub fn survey(&mut self, order: &Order) {
+        self.span.clear();
         let whole = self.whole();
-        let range = if whole { i..i + 1 } else { self.start[i] as usize..self.start[i + 1] as usize };
-        let entry = move |k: usize| (self.cell[k], if whole { 1.0 } else { self.weight[k] });
-        range.map(entry).filter(|e| e.0 != NONE).map(|e| (e.0 as usize, e.1))
+        let Self { start, cell, near, around, span, .. } = self;
+        if let Some((rings, _)) = near {
+            rings.around(&order.occupied, around);
+        }
+        if whole || threads::count() == 1 {
+            return;
+        }
+        let (start, cell, near) = (&*start, &*cell, &*near);
+        *span = threads::map(order.pieces.iter().collect(), |p| match near {
+            Some((rings, _)) => rings.span(&order.occupied[p.cells.clone()]),
+            None => {
+                let entries = start[p.particles.start] as usize..start[p.particles.end] as usize;
+                cell[entries].iter().fold((NONE, 0), |(l, h), c| (l.min(*c), h.max(*c)))
+            }
+        });
     }
     /// Cells that particles go to, with repetitions; `occupied` are their host cells.
     pub fn reached<'a>(&'a self, occupied: &'a [u32]) -> &'a [u32] {
-        if self.whole() { occupied } else { &self.cell }
+        match &self.near {
+            Some(_) => &self.around,
+            None if self.whole() => occupied,
+            None => &self.cell,
+        }
     }
     /// Adds Σ_i m_ik q_i / V_k to each cell, particle by particle in their order; the table must lie in it. `quantity`
     /// also gets what its piece of the particles adds up; returned by piece.
+    ///
+    /// Every thread writes cells of its own. Where particles go to several cells, those around a thread's cells are looked at
+    /// by both threads, so that every cell gets its sum in the order of the particles.
     pub fn deposit<A: Default + Send>(
         &self,
         mesh: &Mesh,
@@ -53,46 +100,86 @@ impl Weights {
         lanes: &mut [Lanes],
         quantity: impl Fn(usize, &mut A) -> Lanes + Sync,
     ) -> Vec<A> {
-        if !self.whole() {
-            // neighbouring pieces share cells
-            let piece = |particles: std::ops::Range<usize>| {
+        let pieces = &order.pieces;
+        let runs = match self.span.len() {
+            _ if self.whole() => pieces.len(),
+            0 => 1,
+            _ => threads::count().min(pieces.len()),
+        };
+        let first = |k: usize| pieces.partition_point(|p| p.particles.start < k * order.inside / runs.max(1));
+        let mut runs: Vec<Range<usize>> = (0..runs).map(|k| first(k)..first(k + 1)).collect();
+        runs.retain(|r| !r.is_empty());
+        let parts = threads::cut(lanes, runs.iter().map(|r| pieces[r.end - 1].slots.end));
+        let sums = threads::map(runs.into_iter().zip(parts).collect(), |(run, part)| {
+            let slots = pieces[run.start].slots.start..pieces[run.end - 1].slots.end;
+            let (mut sums, mut batch) = (Vec::with_capacity(run.len()), Lines([[0.0; 8]; BATCH]));
+            for (k, piece) in pieces.iter().enumerate() {
+                let own = run.contains(&k);
+                let meets = |s: &(u32, u32)| (s.0 as usize) < slots.end && s.1 as usize >= slots.start;
+                if !own && !self.span.get(k).is_some_and(meets) {
+                    continue;
+                }
                 let mut all = A::default();
-                for i in particles {
-                    let q = quantity(i, &mut all);
-                    for (cell, m) in self.entries(i) {
-                        let (to, share) = (&mut lanes[cell], m / mesh.volume[cell]);
-                        (0..8).for_each(|a| to[a] += share * q[a]);
-                    }
+                for at in piece.particles.clone().step_by(BATCH) {
+                    let batch = &mut batch.0[..BATCH.min(piece.particles.end - at)];
+                    batch.iter_mut().enumerate().for_each(|(k, q)| *q = quantity(at + k, &mut all));
+                    self.add(mesh, at, batch, slots.start, part);
                 }
-                all
-            };
-            return order.pieces.iter().map(|p| p.particles.clone()).map(piece).collect();
-        }
-        let parts = threads::cut(lanes, order.pieces.iter().map(|p| p.slots.end));
-        threads::map(order.pieces.iter().zip(parts).collect(), |(piece, part)| {
-            let mut all = A::default();
-            for k in piece.cells.clone() {
-                let (cell, mut sum) = (order.occupied[k] as usize, [0.0; 8]);
-                for i in order.start[k] as usize..order.start[k + 1] as usize {
-                    let q = quantity(i, &mut all);
-                    (0..8).for_each(|a| sum[a] += q[a]);
+                if own {
+                    sums.push(all);
                 }
-                let (to, v) = (&mut part[cell - piece.slots.start], mesh.volume[cell]);
-                (0..8).for_each(|a| to[a] += sum[a] / v);
             }
-            all
-        })
+            sums
+        });
+        sums.into_iter().flatten().collect()
+    }
+    /// `deposit` of the particles from `first` on, into the cells from `from` on that `part` holds.
+    fn add(&self, mesh: &Mesh, first: usize, q: &[Lanes], from: usize, part: &mut [Lanes]) {
+        let range = first..first + q.len();
+        match &self.near {
+            Some((rings, fraction)) => {
+                let (host, fraction) = (&self.cell[range.clone()], &fraction[range]);
+                f64::dispatch(near::Add { rings, volume: &mesh.volume, host, fraction, q, from, part });
+            }
+            None if self.whole() => {
+                f64::dispatch(lists::AddWhole {
+                    volume: &mesh.volume,
+                    host: &self.cell[range],
+                    q,
+                    from,
+                    part,
+                });
+            }
+            None => {
+                let start = &self.start[range.start..=range.end];
+                f64::dispatch(lists::Add { start, weights: self, volume: &mesh.volume, q, from, part });
+            }
+        }
+    }
+    /// Σ_k m_ik φ_k of the particles from `first` on, all with a host.
+    pub fn gather(&self, lanes: &[Lanes], first: usize, out: &mut [Lanes]) {
+        let range = first..first + out.len();
+        match &self.near {
+            Some((rings, fraction)) => {
+                let (host, fraction) = (&self.cell[range.clone()], &fraction[range]);
+                f64::dispatch(near::Gather { rings, host, fraction, lanes, out });
+            }
+            None if self.whole() => {
+                out.iter_mut().zip(&self.cell[range]).for_each(|(to, c)| *to = lanes[*c as usize]);
+            }
+            None => {
+                let start = &self.start[range.start..=range.end];
+                f64::dispatch(lists::Gather { start, weights: self, lanes, out });
+            }
+        }
     }
     /// Σ_k m_ik φ_k of particle i.
-    #[inline(always)]
-    pub fn gather(&self, lanes: &[Lanes], i: usize) -> Lanes {
-        if self.whole() {
-            return lanes[self.cell[i] as usize];
-        }
-        let mut sum = [0.0; 8];
-        for (cell, m) in self.entries(i) {
-            (0..8).for_each(|a| sum[a] += m * lanes[cell][a]);
-        }
-        sum
+    pub fn gather_one(&self, lanes: &[Lanes], i: usize) -> Lanes {
+        let mut out = [[0.0; 8]];
+        self.gather(lanes, i, &mut out);
+        out[0]
     }
 }
+
+/// Particles whose numbers stay in the nearest cache.
+pub const BATCH: usize = 256;

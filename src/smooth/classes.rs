@@ -125,10 +125,15 @@ mod tests {
         let c = Classes::new(&mesh, &[[1e-3, 4e-3], [2e-3, 8e-3]], 2e-2);
         assert_eq!([4e-4, 5e-4, 6e-4, 1e-3, 3e-3].map(|r| c.of(r)), [0, 0, 1, 1, 2]);
         assert_eq!((c.row(5, 3e-3), c.row(5, 1e-4), c.row(NONE, 3e-3)), (53, 5, NONE));
-        let mut w = Weights { start: vec![], cell: vec![1, 2, NONE], weight: vec![] };
+        let mut w = Weights::default();
+        w.by_hosts(&[1, 2, NONE]);
         c.shift(&mut w, &[3e-3, 7e-4, 3e-3]);
         assert_eq!(w.cell, [49, 26, NONE]);
-        let mut w = Weights { start: vec![0, 2, 3], cell: vec![1, 2, 3], weight: vec![0.5, 0.5, 1.0] };
+        w.clear();
+        for cells in [&[(1, 0.5), (2, 0.5)][..], &[(3, 1.0)]] {
+            cells.iter().for_each(|(c, m)| w.push(*c, *m));
+            w.close();
+        }
         c.shift(&mut w, &[7e-4, 1e-4]);
         assert_eq!(w.cell, [25, 26, 3]);
     }

@@ -40,6 +40,7 @@ pub use graph::Graph;
 pub use pcg::Implicit;
 pub use pinned::Pinned;
 pub use polynomial::{Polynomial, Single};
+pub(crate) use real::Real;
 
 use crate::mesh::Mesh;
 use crate::step::Lanes;
@@ -128,8 +129,12 @@ impl Smoother for Unsmoothed {
     fn apply(&mut self, _: &mut [Lanes], _: &Active, _: Direction, _: &mut Scratch) {}
 }
 
+/// What is used unless another is asked for.
+pub const DEFAULT: &str = "gaussian";
+
 /// Names in case.toml.
 pub const NAMES: &[&str] = &[
+    DEFAULT,
     "chebyshev",
     "chebyshev-u",
     "uniformization",
@@ -172,6 +177,12 @@ pub fn on(
 ) -> Option<Box<dyn Smoother>> {
     let graph = Arc::clone(graph);
     Some(match name {
+        DEFAULT => {
+            // where cells are about as large as b, steps of Euler are nearer to the particles' Gaussians, positive and no dearer
+            let euler = Polynomial::forward_euler(Arc::clone(&graph));
+            let series = Polynomial::chebyshev(graph, tolerance, tolerance > MATCHED);
+            Box::new(if euler.degree() <= series.degree() { euler } else { series })
+        }
         "chebyshev" => Box::new(Polynomial::chebyshev(graph, tolerance, tolerance > MATCHED)),
         "chebyshev-u" => Box::new(Polynomial::second_kind(graph, tolerance)),
         "uniformization" => Box::new(Polynomial::uniformization(graph, tolerance)),

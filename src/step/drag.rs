@@ -10,19 +10,19 @@ use crate::forces::history::Memory;
 use crate::forces::{Around, Slip};
 use crate::interpolate::{self, FluidVelocity};
 use crate::linearise::{Kept, LEVEL, Part, Predicted, linearise};
+use crate::map::BATCH;
 use crate::particles::Particles;
 use crate::scheme::{Before, Cells};
-use crate::smooth::Direction;
+use crate::smooth::{Direction, Field};
 use crate::sums::norm;
 use crate::threads;
 use std::time::Instant;
 
-/// Particles whose drag is computed together: their numbers stay in the nearest cache.
-const BATCH: usize = 256;
-
 /// Particles whose drag is computed together.
 #[derive(Default)]
 struct Batch {
+    /// what they read of the smoothed lanes
+    lanes: Field,
     slips: Vec<Slip>,
     /// u − v, m/s
     vectors: Vec<[f64; 3]>,
@@ -83,11 +83,13 @@ impl CouplingStep {
         b.gathered.clear();
         b.defects.clear();
         b.drag.resize(count, 0.0);
+        b.lanes.fit(BATCH);
+        self.weights.gather(&self.work, begin, &mut b.lanes[..count]);
         for k in 0..count {
             let i = begin + k;
-            let l = self.weights.gather(&self.work, i);
+            let l = b.lanes[k];
             let voidage = (1.0 - l[0]).max(s.voidage_min.max(f64::MIN_POSITIVE));
-            let g = if first { self.weights.gather(&self.gathered, i) } else { l };
+            let g = if first { self.weights.gather_one(&self.gathered, i) } else { l };
             let gathered = [g[fluid], g[fluid + 1], g[fluid + 2]];
             let host = self.hosts[i] as usize;
             let u = interpolate::fluid_velocity(
@@ -100,21 +102,20 @@ impl CouplingStep {
             );
             let vector = [0, 1, 2].map(|a| u[a] - p.velocity[i][a]);
             b.defects.push([0, 1, 2].map(|a| u[a] - gathered[a]));
-            let slip = Slip {
+            b.slips.push(Slip {
                 diameter: 2.0 * p.radius[i] / s.extra.ratio(&p.asked.kind, i),
                 voidage,
                 speed: norm(vector),
                 kinematic_viscosity: s.kinematic_viscosity,
                 density: s.density,
-            };
-            if around {
-                let (sauter_diameter, cell_volume) = (l[0] / l[7], self.mesh.volume[host]);
-                let around = Around { sauter_diameter, cell_volume };
-                b.drag[k] = s.drag.drag_coefficient_in(&slip, &around);
-            }
-            b.slips.push(slip);
+            });
             b.vectors.push(vector);
             b.gathered.push(gathered);
+        }
+        for k in 0..if around { count } else { 0 } {
+            let (l, host) = (&b.lanes[k], self.hosts[begin + k] as usize);
+            let around = Around { sauter_diameter: l[0] / l[7], cell_volume: self.mesh.volume[host] };
+            b.drag[k] = s.drag.drag_coefficient_in(&b.slips[k], &around);
         }
         if !around {
             s.drag.coefficients(&b.slips, &mut b.drag);
@@ -170,7 +171,8 @@ impl CouplingStep {
             // all zero: kept ready, and off
             return;
         }
-        let solid = |i: usize| if s.extra.felderhof { self.weights.gather(&self.work, i)[0] } else { 0.0 };
+        let solid =
+            |i: usize| if s.extra.felderhof { self.weights.gather_one(&self.work, i)[0] } else { 0.0 };
         let coefficient = |i: usize| s.extra.coefficient(solid(i), p.mass[i] / (p.volume(i) * s.density));
         let coefficients: Vec<f64> =
             (0..if s.extra.sends_added_mass() { inside } else { 0 }).map(coefficient).collect();

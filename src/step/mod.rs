@@ -253,6 +253,7 @@ impl CouplingStep {
         let begin = Instant::now();
         self.mapping.weights(&self.mesh, &p.position, &p.radius, &self.hosts, &mut self.weights);
         self.classes.shift(&mut self.weights, &p.radius);
+        self.weights.survey(&self.order);
         self.sources.voidage_old.clone_from(&self.sources.voidage);
         self.smoother = 0;
         self.seconds.map = begin.elapsed().as_secs_f64();

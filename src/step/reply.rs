@@ -8,6 +8,7 @@ use super::{CouplingStep, Fluid, StepError};
 use crate::balance::Books;
 use crate::forces::Extra;
 use crate::interpolate;
+use crate::map::{BATCH, Lines};
 use crate::mesh::NONE;
 use crate::particles::Particles;
 use crate::smooth::Direction;
@@ -87,10 +88,13 @@ impl CouplingStep {
         let parts = coefficient.into_iter().zip(velocity).zip(force).zip(charged);
         let sums =
             threads::map(pieces.iter().zip(parts).collect(), |(piece, (((k_of, u_of), f_of), j_of))| {
-                let mut sums = Sums::<10>::default();
+                let (mut sums, mut lanes) = (Sums::<10>::default(), Lines([[0.0; 8]; BATCH]));
                 for (at, i) in piece.particles.clone().enumerate() {
-                    let (g, q, v) =
-                        (self.weights.gather(&self.gathered, i), self.predicted.of(i), p.volume(i));
+                    if at % BATCH == 0 {
+                        let left = BATCH.min(piece.particles.len() - at);
+                        self.weights.gather(&self.gathered, i, &mut lanes.0[..left]);
+                    }
+                    let (g, q, v) = (lanes.0[at % BATCH], self.predicted.of(i), p.volume(i));
                     let u = [0, 1, 2].map(|a| g[a] + q.defect[a]);
                     let mut outer =
                         [0, 1, 2].map(|a| -v * (s.density * s.archimedes[a] + s.mean_pressure_gradient[a]));

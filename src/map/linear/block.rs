@@ -1,31 +1,31 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Rectilinear blocks of hexahedra, at any angle: three pairs of parallel sides at right angles, centres of
 //! neighbours on the normals, and the 26 cells around it reached the same way in any order of steps. Tri-linear
-//! weights between cell centres.
+//! weights between cell centres. Directions and distances that agree to nine digits count as one.
 
-use super::super::Weights;
+use super::rings::{Fraction, OWN, Rings};
 use crate::mesh::geometry::{V, dot, length, scale, sub};
 use crate::mesh::{Mesh, NONE, Side};
+use std::collections::HashMap;
+use std::sync::Arc;
 
-/// What a cell needs: axis, 1/distance to the neighbours below and above (0 at a wall).
-#[derive(Clone, Copy, Debug, Default)]
-struct Axis {
-    n: V,
-    inverse: [f64; 2],
-}
-
-/// All cells; those not in a block have `ring` entry `NOT`.
+/// All cells of a mesh.
 #[derive(Debug, Default)]
 pub(super) struct Block {
-    axes: Vec<[Axis; 3]>,
-    /// the 27 cells of each cell by (1 + step) in base 3, itself in the middle (`NONE`: behind a wall); `NOT` in
-    /// the middle: not in a block
-    ring: Vec<[u32; 27]>,
+    /// three directions
+    frames: Vec<[V; 3]>,
+    /// 1/distance to the centres below and above (0 at a wall), 1/m
+    steps: Vec<[f64; 2]>,
+    /// frame of a cell and its steps along the three directions
+    cells: Vec<(u32, [u32; 3])>,
+    /// the cells around each; those not in a block have none
+    pub rings: Arc<Rings>,
 }
 
-const NOT: u32 = NONE - 1;
 /// Rounding of directions (radians).
 const STRAIGHT: f64 = 1e-7;
+/// Digits of a table's keys.
+const DIGITS: f64 = 1e9;
 
 fn out(s: &Side) -> V {
     [s.plane[0], s.plane[1], s.plane[2]]
@@ -34,63 +34,79 @@ fn out(s: &Side) -> V {
 fn step(mesh: &Mesh, cell: usize, s: &Side) -> V {
     sub(sub(mesh.centre[s.across as usize], mesh.shift(s)), mesh.centre[cell])
 }
-/// The only side towards `way`.
-fn towards(mesh: &Mesh, cell: usize, way: V) -> Option<&Side> {
-    let mut list = mesh.sides(cell).iter().filter(|s| dot(out(s), way) > 1.0 - STRAIGHT * STRAIGHT);
+/// The only side towards `way`: which it is.
+fn place(mesh: &Mesh, cell: usize, way: V) -> Option<usize> {
+    let sides = mesh.sides(cell).iter().enumerate();
+    let mut list = sides.filter(|s| dot(out(s.1), way) > 1.0 - STRAIGHT * STRAIGHT).map(|s| s.0);
     let first = list.next()?;
     list.next().is_none().then_some(first)
 }
+/// The only side towards `way`.
+fn towards(mesh: &Mesh, cell: usize, way: V) -> Option<&Side> {
+    place(mesh, cell, way).map(|k| &mesh.sides(cell)[k])
+}
+
+/// Number of `value` in `table`, which grows if it is new.
+fn number<K: std::hash::Hash + Eq, T>(
+    known: &mut HashMap<K, u32>,
+    table: &mut Vec<T>,
+    key: K,
+    value: T,
+) -> u32 {
+    *known.entry(key).or_insert_with(|| {
+        table.push(value);
+        table.len() as u32 - 1
+    })
+}
+
+/// A cell that may be in a block.
+struct Candidate {
+    n: [V; 3],
+    /// 1/distance to the centres below and above (0 at a wall), 1/m
+    inverse: [[f64; 2]; 3],
+    /// which of its sides are below and above along each direction
+    sides: Sides,
+}
+type Sides = [[u8; 2]; 3];
 
 impl Block {
     pub fn new(mesh: &Mesh) -> Self {
         let mut block = Self::default();
+        let (mut frames, mut steps, mut sides) = (HashMap::new(), HashMap::new(), Vec::new());
         for cell in 0..mesh.len() {
-            let made = cell_of(mesh, cell);
-            let mut none = [NONE; 27];
-            none[13] = NOT;
-            let (axes, ring) = made.unwrap_or(([Axis::default(); 3], none));
-            block.axes.push(axes);
-            block.ring.push(ring);
+            let Some(c) = candidate(mesh, cell) else {
+                block.cells.push((NONE, [0; 3]));
+                sides.push(Sides::default());
+                continue;
+            };
+            sides.push(c.sides);
+            let key = c.n.map(|n| n.map(|x| (x * DIGITS).round() as i64));
+            let frame = number(&mut frames, &mut block.frames, key, c.n);
+            let of = c.inverse.map(|i| {
+                let key = i.map(|x| x.to_bits() >> 22); // 30 bits after the point
+                number(&mut steps, &mut block.steps, key, i)
+            });
+            block.cells.push((frame, of));
         }
+        let rings = Rings::new(mesh.len(), |cell| block.ring(mesh, cell, &sides));
+        block.rings = Arc::new(rings);
         block
     }
-    pub fn len(&self) -> usize {
-        self.ring.len()
-    }
     pub fn holds(&self, cell: usize) -> bool {
-        self.ring[cell][13] != NOT
+        self.rings.hold(cell)
     }
-    /// False: not in a block.
-    #[inline]
-    pub fn weights(&self, mesh: &Mesh, cell: usize, x: V, out: &mut Weights) -> bool {
-        let (ring, axes) = (&self.ring[cell], &self.axes[cell]);
-        if ring[13] == NOT {
-            return false;
-        }
-        let d = sub(x, mesh.centre[cell]);
-        let (mut t, mut way) = ([0.0; 3], [0usize; 3]);
+    /// Where x lies between the centre of its cell and the next ones.
+    #[inline(always)]
+    pub fn fraction(&self, mesh: &Mesh, cell: usize, x: V) -> Fraction {
+        let (frame, steps) = &self.cells[cell];
+        let (n, centre, mut t) = (&self.frames[*frame as usize], &mesh.centre[cell], [0.0; 3]);
         for a in 0..3 {
-            let s = dot(d, axes[a].n);
-            let high = usize::from(s > 0.0);
-            t[a] = s.abs() * axes[a].inverse[high];
-            let unit = [1, 3, 9][a];
-            way[a] = if high == 1 { 13 + unit } else { 13 - unit };
+            let d =
+                (x[0] - centre[0]) * n[a][0] + (x[1] - centre[1]) * n[a][1] + (x[2] - centre[2]) * n[a][2];
+            let inverse = &self.steps[steps[a] as usize];
+            t[a] = (d * if d > 0.0 { inverse[1] } else { inverse[0] }).clamp(-1.0, 1.0);
         }
-        for corner in 0..8usize {
-            let (mut w, mut at) = (1.0, 13usize);
-            for a in 0..3 {
-                if corner >> a & 1 == 1 {
-                    w *= t[a];
-                    at = at + way[a] - 13;
-                } else {
-                    w *= 1.0 - t[a];
-                }
-            }
-            if w > 0.0 {
-                out.push(ring[at], w);
-            }
-        }
-        true
+        t
     }
     /// Mean over the cell's half towards `way` of the deposit's variance along it minus that of the cell itself:
     /// ⟨y (d − y)⟩ − ⟨y²⟩ for y from 0 to h/2.
@@ -102,9 +118,63 @@ impl Block {
         let h = faces[0] + faces[1];
         d * h / 4.0 - h * h / 6.0
     }
+
+    /// The 27 cells around one (`NONE`: behind a wall).
+    fn ring(&self, mesh: &Mesh, cell: usize, known: &[Sides]) -> Option<[u32; 27]> {
+        let (frame, own) = self.cells[cell];
+        if frame == NONE {
+            return None;
+        }
+        let (n, close) = (&self.frames[frame as usize], 1e-7 * mesh.volume[cell].cbrt());
+        let next = |at: usize, a: usize, step: i32| {
+            if self.cells[at].0 == frame {
+                return Some(&mesh.sides(at)[usize::from(known[at][a][usize::from(step > 0)])]);
+            }
+            towards(mesh, at, scale(n[a], f64::from(step)))
+        };
+        let mut ring = [NONE; 27];
+        ring[OWN] = cell as u32;
+        for (k, slot) in ring.iter_mut().enumerate() {
+            let steps = [k % 3, k / 3 % 3, k / 9].map(|s| s as i32 - 1);
+            let some: Vec<usize> = (0..3).filter(|a| steps[*a] != 0).collect();
+            let orders: &[&[usize]] = match some[..] {
+                [] => continue,
+                [_] => &[&[0]],
+                [_, _] => &[&[0, 1], &[1, 0]],
+                _ => &[&[0, 1, 2], &[1, 2, 0], &[2, 0, 1], &[0, 2, 1], &[1, 0, 2], &[2, 1, 0]],
+            };
+            let mut found: Option<Option<u32>> = None;
+            for order in orders {
+                // the centre must lie where the steps say: the product of one-dimensional weights keeps the first moment
+                let (mut at, mut sum) = (Some(cell as u32), [0.0; 3]);
+                for a in order.iter().map(|o| some[*o]) {
+                    let Some(cell) = at else { break };
+                    let side = next(cell as usize, a, steps[a])?;
+                    at = (side.across != NONE).then_some(side.across);
+                    if at.is_some() {
+                        let d = step(mesh, cell as usize, side);
+                        (0..3).for_each(|b| sum[b] += d[b]);
+                    }
+                }
+                if found.is_some_and(|f| f != at) {
+                    return None;
+                }
+                found = Some(at);
+                for a in 0..3 {
+                    let inverse = self.steps[own[a] as usize][usize::from(steps[a] > 0)];
+                    let want = if steps[a] == 0 { 0.0 } else { f64::from(steps[a]) / inverse };
+                    if at.is_some() && (dot(sum, n[a]) - want).abs() > close {
+                        return None;
+                    }
+                }
+            }
+            *slot = found.flatten().unwrap_or(NONE);
+        }
+        Some(ring)
+    }
 }
 
-fn cell_of(mesh: &Mesh, cell: usize) -> Option<([Axis; 3], [u32; 27])> {
+fn candidate(mesh: &Mesh, cell: usize) -> Option<Candidate> {
     let sides = mesh.sides(cell);
     if sides.len() != 6 {
         return None;
@@ -126,58 +196,22 @@ fn cell_of(mesh: &Mesh, cell: usize) -> Option<([Axis; 3], [u32; 27])> {
     {
         return None;
     }
-    let mut axes = n.map(|n| Axis { n, inverse: [0.0; 2] });
-    for axis in &mut axes {
+    let (mut inverse, mut which) = ([[0.0; 2]; 3], Sides::default());
+    for a in 0..3 {
         for high in 0..2 {
-            let way = scale(axis.n, if high == 1 { 1.0 } else { -1.0 });
-            let side = towards(mesh, cell, way)?;
+            let way = scale(n[a], if high == 1 { 1.0 } else { -1.0 });
+            let k = place(mesh, cell, way)?;
+            which[a][high] = k as u8;
+            let side = &sides[k];
             if side.across != NONE {
                 let d = step(mesh, cell, side);
                 let size = length(d);
                 if dot(d, way) < size * (1.0 - 1e-12) {
                     return None;
                 }
-                axis.inverse[high] = 1.0 / size;
+                inverse[a][high] = 1.0 / size;
             }
         }
     }
-    let mut ring = [NONE; 27];
-    for (k, slot) in ring.iter_mut().enumerate() {
-        let steps = [k % 3, k / 3 % 3, k / 9].map(|s| s as i32 - 1);
-        let mut found: Option<Option<u32>> = None;
-        for order in [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [1, 0, 2], [2, 1, 0]] {
-            let mut at = cell as u32;
-            for a in order {
-                if steps[a] != 0 && at != NONE {
-                    at = towards(mesh, at as usize, scale(n[a], f64::from(steps[a])))?.across;
-                }
-            }
-            let at = (at != NONE).then_some(at);
-            if found.is_some_and(|f| f != at) {
-                return None;
-            }
-            found = Some(at);
-        }
-        *slot = found.flatten().unwrap_or(NONE);
-        // the centre must lie where the steps say: the product of one-dimensional weights keeps the first moment
-        if *slot != NONE && steps.iter().filter(|s| **s != 0).count() > 1 {
-            let (mut at, mut sum) = (cell, [0.0; 3]);
-            for a in 0..3 {
-                if steps[a] != 0 {
-                    let side = towards(mesh, at, scale(n[a], f64::from(steps[a])))?;
-                    let d = step(mesh, at, side);
-                    (0..3).for_each(|b| sum[b] += d[b]);
-                    at = side.across as usize;
-                }
-            }
-            for a in 0..3 {
-                let inverse = axes[a].inverse[usize::from(steps[a] > 0)];
-                let want = if steps[a] == 0 { 0.0 } else { f64::from(steps[a]) / inverse };
-                if (dot(sum, n[a]) - want).abs() > 1e-7 * mesh.volume[cell].cbrt() {
-                    return None;
-                }
-            }
-        }
-    }
-    Some((axes, ring))
+    Some(Candidate { n, inverse, sides: which })
 }

@@ -12,28 +12,34 @@
 //! walls where face lines meet their faces). A block ends one cell before cells that are not rectilinear; there the
 //! weights jump, with the same sum and first moment.
 //! Source: cloud in cell: Birdsall & Fuss 1969; this construction on polyhedra: own.
-//! Error: the deposit adds a variance, h²/12 per axis beyond a cell's own on a uniform block; `link_variance` gives
-//! it per face. Measured (`examples/mappings.rs`, solid fraction against the particles' exact Gaussian, b/h from 0.7 to 4):
-//! on hexahedra 2.2 to 4.9 times less error than the particle centroid with T = b²/4 left alone, 1.6 to 3.5 times with
-//! T = b²/4 − variance/2, because the two-point Laplacian's kernel is too peaked and the deposit's spread
-//! offsets that; polyhedra 1.7 to 2.3 times; graded hexahedra 1.1 to 4.2 times (at b/h = 4 the Laplacian's own error
-//! on the grading rules). On tetrahedra of cubes (six each) the two-point Laplacian is inconsistent and itself about
-//! 10 % wrong whatever the deposit; the gain there is 1.1 to 1.8 times, and T = b²/4 − variance/2 can be a loss at
-//! b/h ≤ 1: corner weights reach some 24 cells.
+//! Error: the deposit adds a variance, h²/12 per axis beyond a cell's own on a uniform block; `link_variance` gives it per face. T = b²/4 is
+//! left alone: the two-point Laplacian's kernel is too peaked, and the deposit's spread offsets that. Gains over the particle centroid by
+//! mesh and b/h: docs/bench.md.
 
 mod block;
 mod fan;
+mod rings;
+
+pub use rings::{Fraction, Rings};
+pub(super) use rings::{PLACE, ROOM, shares};
 
 use super::cells::Cells;
 use super::{Mapping, Options, Weights};
 use crate::mesh::{Mesh, NONE};
+use crate::threads;
 use block::Block;
 use fan::Fan;
+use std::sync::Arc;
+
+/// Particles that one thread takes at a time.
+const PIECE: usize = 4096;
 
 /// The mapping.
 #[derive(Default)]
 pub struct Linear {
     block: Block,
+    /// all cells are in blocks
+    blocks: bool,
     fan: Fan,
 }
 
@@ -45,23 +51,38 @@ impl Mapping for Linear {
         "cloud in cell (Birdsall & Fuss 1969), on polyhedra by tetrahedra and corner weights of largest entropy"
     }
     fn properties(&self) -> &'static str {
-        "conservative, positive, first moment kept (skew faces: 0.004 h off on average); own variance known; 0.02 us per particle on \
+        "conservative, positive, first moment kept (skew faces: 0.004 h off on average); own variance known; 0.01 us per particle on \
          hexahedra, 0.2 to 1 elsewhere"
     }
     fn prepare(&mut self, mesh: &Mesh, _: &Options) {
         self.block = Block::new(mesh);
-        let all = (0..mesh.len()).all(|c| self.block.holds(c));
-        self.fan = if all { Fan::default() } else { Fan::new(mesh, Cells::new(mesh)) };
+        self.blocks = (0..mesh.len()).all(|c| self.block.holds(c));
+        self.fan = if self.blocks { Fan::default() } else { Fan::new(mesh, Cells::new(mesh)) };
     }
     fn weights(&self, mesh: &Mesh, position: &[[f64; 3]], _: &[f64], host: &[u32], out: &mut Weights) {
-        assert_eq!(self.block.len(), mesh.len(), "linear: prepare() it for this mesh first");
-        out.clear();
-        for (x, h) in position.iter().zip(host) {
-            if *h != NONE && !self.block.weights(mesh, *h as usize, *x, out) {
-                self.fan.weights(mesh, *h, *x, out);
-            }
-            out.close();
+        assert_eq!(self.block.rings.len(), mesh.len(), "linear: prepare() it for this mesh first");
+        if !self.blocks {
+            return out.fill(host, |_: &mut (), i, h, out| {
+                if self.block.holds(h as usize) {
+                    let fraction = self.block.fraction(mesh, h as usize, position[i]);
+                    let (cell, weight) = self.block.rings.eight(h, fraction);
+                    (0..8).filter(|c| weight[*c] > 0.0).for_each(|c| out.push(cell[c], weight[c]));
+                } else {
+                    self.fan.weights(mesh, h, position[i], out);
+                }
+                out.close();
+            });
         }
+        let mut fraction = out.near.take().unwrap_or_default().1;
+        out.by_hosts(host);
+        fraction.resize(host.len(), [0.0; 3]);
+        let parts = fraction.chunks_mut(PIECE).zip(host.chunks(PIECE).zip(position.chunks(PIECE)));
+        threads::map(parts.collect(), |(to, (host, position))| {
+            for ((to, h), x) in to.iter_mut().zip(host).zip(position).filter(|p| *p.0.1 != NONE) {
+                *to = self.block.fraction(mesh, *h as usize, *x);
+            }
+        });
+        out.near = Some((Arc::clone(&self.block.rings), fraction));
     }
     fn link_variance(&self, mesh: &Mesh) -> Vec<f64> {
         // by side of a cell; the two cells of a link by volume
