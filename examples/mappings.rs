@@ -82,6 +82,14 @@ fn cost() {
         ("warped hex", Made::hex([24; 3], size).jiggled(0.2)),
     ] {
         let mesh = made.mesh();
+        let start = Instant::now();
+        let linked = mesh.with_voronoi_links();
+        let (t, n) = (start.elapsed().as_secs_f64() * 1e6, mesh.len() as f64);
+        println!(
+            "{name:12} Voronoi links      {:10.4} µs per cell  {:6.1} links",
+            t / n,
+            linked.links.len() as f64 / n
+        );
         let mut seed = 5;
         let mut position: Vec<[f64; 3]> =
             (0..20_000).map(|_| made.size.map(|s| s * (0.02 + 0.96 * random(&mut seed)))).collect();

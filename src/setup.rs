@@ -10,7 +10,8 @@ use crate::output::restart::State;
 use crate::partners::Partners;
 use crate::smooth::{self, Classes, Diffusion, Pinned, Smoother};
 use crate::step::{CouplingStep, Setup};
-use crate::{forces, map, scheme};
+use crate::{forces, map, scheme, threads};
+use std::borrow::Cow;
 use voidage_wire::{Transport, Welcome};
 
 /// The forces beside drag.
@@ -98,14 +99,22 @@ pub fn classes(c: &Config, mesh: &Mesh) -> Classes {
     Classes::new(mesh, &c.file.smooth.by_diameter, c.file.smooth.bandwidth)
 }
 
-/// R's continuation of the solids velocity, if it is asked for.
+/// The mesh with the links that smoothing goes along.
+pub fn linked<'a>(c: &Config, mesh: &'a Mesh) -> Cow<'a, Mesh> {
+    match c.file.smooth.links.as_str() {
+        "voronoi" => Cow::Owned(mesh.with_voronoi_links()),
+        _ => Cow::Borrowed(mesh),
+    }
+}
+
+/// R's continuation of the solids velocity, if it is asked for; `mesh` is the linked one.
 pub fn pinned(c: &Config, mesh: &Mesh) -> Option<Pinned> {
     let s = &c.file.smooth;
     let t = Diffusion { bandwidth: s.bandwidth, largest_cell: s.largest_cell, ..Diffusion::default() };
     (c.file.coupling.void_velocity == "pinned").then(|| Pinned::new(mesh, &t.links(mesh)))
 }
 
-/// The smoother asked for and the positive one for redone steps, on the rows of all classes.
+/// The smoother asked for and the positive one for redone steps, on the rows of all classes; `mesh` is the linked one.
 pub fn smoothers(c: &Config, mesh: &Mesh) -> Result<[Box<dyn Smoother>; 2], String> {
     let s = &c.file.smooth;
     let (classes, like) =
@@ -120,9 +129,11 @@ pub fn smoothers(c: &Config, mesh: &Mesh) -> Result<[Box<dyn Smoother>; 2], Stri
 
 /// The coupling step of a case on a mesh.
 pub fn step(c: &Config, mesh: Mesh) -> Result<CouplingStep, String> {
-    let [smoother, positive] = smoothers(c, &mesh)?;
     let mapping = mapping(c, &mesh)?;
-    let (classes, pinned) = (classes(c, &mesh), pinned(c, &mesh));
+    let linked = threads::within(pool(c)?.as_ref(), || linked(c, &mesh));
+    let [smoother, positive] = smoothers(c, &linked)?;
+    let (classes, pinned) = (classes(c, &mesh), pinned(c, &linked));
+    drop(linked);
     let step = CouplingStep::new(mesh, setup(c)?, mapping, smoother, positive);
     Ok(step.with_classes(classes).with_pinned(pinned).with_watch(Watch::new(c)))
 }

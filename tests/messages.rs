@@ -186,6 +186,12 @@ fn errors() {
             &["smooth.by_diameter=[[2e-3, 8e-3], [1e-3, 4e-3]]"],
             &["smooth.by_diameter = [[0.002, 0.008], [0.001, 0.004]]", "must ascend"],
         ),
+        (
+            BED,
+            &[],
+            &["smooth.links=face"],
+            &["smooth.links", "accepted: faces, voronoi", "smooth.links = \"faces\"?"],
+        ),
         (BED, &[], &["smooth.by_diameter=[[2e-3, -1.0]]"], &["smooth.by_diameter = -1", "a bandwidth"]),
         (SETTLING, &[], &["smooth.by_diameter=[[2e-3, 8e-3]]"], &["nothing is smoothed", "\"gaussian\""]),
         (

@@ -272,6 +272,9 @@ fn smoother() -> String {
 fn tolerance() -> f64 {
     1e-2
 }
+fn faces() -> String {
+    "faces".into()
+}
 
 /// Section `smooth`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -284,6 +287,8 @@ pub struct Smooth {
     pub bandwidth: f64,
     #[serde(default = "tolerance")]
     pub tolerance: f64,
+    #[serde(default = "faces")]
+    pub links: String,
     #[serde(default)]
     pub by_diameter: Vec<[f64; 2]>,
     #[serde(default)]
@@ -511,6 +516,13 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
         "error of the smoothing operator; below 1e-2 the deposit's own error dominates",
     ),
     (
+        "smooth.links",
+        "",
+        "faces",
+        "what the smoother's Laplacian joins cells by: faces (of the mesh) | voronoi (of the diagram of the cell centres: exact moments \
+         on tetrahedra)",
+    ),
+    (
         "smooth.by_diameter",
         "m",
         "[]",
@@ -733,6 +745,7 @@ fn names(file: &CaseFile) -> Vec<Problem> {
     check("coupling.void_velocity", &file.coupling.void_velocity, vec!["kernel", "pinned"]);
     check("map.method", &file.map.method, map::all().iter().map(|m| m.name()).collect());
     check("smooth.method", &file.smooth.method, smooth::NAMES.to_vec());
+    check("smooth.links", &file.smooth.links, vec!["faces", "voronoi"]);
     check("interpolate.fluid_velocity", &file.interpolate.fluid_velocity, FluidVelocity::NAMES.to_vec());
     check("limits.outside", &file.limits.outside, vec!["error", "exclude"]);
     check("output.picture", &file.output.picture, vec!["none", "x", "y", "z"]);

@@ -2,13 +2,15 @@
 //! The coupler's own copy of the mesh: pieces of the CFD ranks joined by global cell id.
 //!
 //! Reads pieces (points m, faces, owner/neighbour, patches); writes geometry (`geometry`), what lies across
-//! each face (`join`) and the Laplacian's graph. The result is the same to the bit however the mesh is split:
+//! each face (`join`) and the Laplacian's graph (`join`: across faces; `voronoi`: between centres). The result is the same to the bit however the mesh is split:
 //! every face is computed from one canonical description, sums run in global-id order. Does not know particles.
 
+mod clip;
 pub(crate) mod geometry;
 mod join;
 pub mod made;
 mod piece;
+mod voronoi;
 
 pub use join::assemble;
 pub use piece::{MeshPiece, Patch, PatchKind};
@@ -61,7 +63,7 @@ impl Side {
 pub struct Link {
     /// neighbour slot
     pub to: u32,
-    /// |S_f| / d_f, m
+    /// |S_f| / d_f, m, of faces of the mesh or of the Voronoi diagram of the centres
     pub weight: f64,
 }
 
