@@ -205,6 +205,9 @@ fn coupled(case: &Path, resolved: bool, restart: Option<&Path>) -> Result<(), St
     result
 }
 
+/// Mean non-orthogonality (degrees) from which the kernel is more than a few per cent off.
+const SKEW: f64 = 10.0;
+
 fn exchange(
     config: &Config,
     session: &Session,
@@ -222,8 +225,15 @@ fn exchange(
     }
     let mesh = receive_mesh(partners).map_err(|e| e.to_string())?;
     println!("mesh: {} cells of {} ranks", mesh.len(), session.cfd_ranks);
+    let angle = mesh.non_orthogonality();
     let step = setup::step(config, mesh)?;
     println!("smoothing: {}, {} sweeps", step.smoother().name(), step.smoother().degree());
+    if angle > SKEW && step.smoother().degree() > 0 && config.file.smooth.links == "faces" {
+        println!(
+            "note: the mesh's non-orthogonality is {angle:.0} degrees on average, which distorts the kernel; smooth.links = \"voronoi\" \
+             does not (docs/bench.md)"
+        );
+    }
     let file = config.folder.join("monitor.csv");
     let monitor = match &resume {
         None => Monitor::create(&file, false),

@@ -138,6 +138,23 @@ impl Mesh {
     pub fn shift(&self, side: &Side) -> [f64; 3] {
         if side.shifts() { self.shifts[side.patch() as usize] } else { [0.0; 3] }
     }
+    /// Mean angle between the faces' normals and the lines between the centres on both sides, by area, degrees (checkMesh:
+    /// "mesh non-orthogonality average", there by face).
+    pub fn non_orthogonality(&self) -> f64 {
+        let (mut sum, mut all) = (0.0, 0.0);
+        for i in 0..self.len() {
+            for s in self.sides(i).iter().filter(|s| s.across != NONE) {
+                let (j, shift) = (s.across as usize, self.shift(s));
+                let d = [0, 1, 2].map(|a| self.centre[j][a] - shift[a] - self.centre[i][a]);
+                let (n, size) = ([s.plane[0], s.plane[1], s.plane[2]], geometry::length(d));
+                // the link's weight × d is the area
+                let area = self.links(i).iter().find(|l| l.to as usize == j).map_or(0.0, |l| l.weight * size);
+                sum += area * (geometry::dot(n, d) / size).clamp(-1.0, 1.0).acos().to_degrees();
+                all += area;
+            }
+        }
+        if all > 0.0 { sum / all } else { 0.0 }
+    }
     /// Laplacian row of a cell.
     pub fn links(&self, slot: usize) -> &[Link] {
         &self.links[self.link_start[slot] as usize..self.link_start[slot + 1] as usize]
