@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! What the mappings cost and what they are worth: `cargo run --release --example mappings -- [cost|error|bed]`.
+//! What the mappings cost and what they are worth: `cargo run --release --example mappings -- [cost|error|unstructured|bed]`.
 //!
 //! cost: µs per particle, cell-sorted, in a box of cells of 2.25 mm with particles of 1.2 mm. error: solid fraction against
-//! the exact Gaussian of the particles, on many meshes, by exp(Δ_T) and by forward-euler. bed: plane-averaged
+//! the exact Gaussian of the particles, on many meshes, by exp(Δ_T) and by forward-euler. unstructured: the same along Voronoi links
+//! and with the maximum-entropy deposit. bed: plane-averaged
 //! solid fraction of the settled bed of cases/fluidised-bed on the meshes A to E of Sun & Xiao 2015, table 2.
 
 use std::sync::Arc;
 use std::time::Instant;
 use voidage::bench::gauss::Lattice;
 use voidage::locate::Locator;
-use voidage::map::{self, Kernel, Linear, Mapping, Options, ParticleCentroid, Weights};
+use voidage::map::{self, Kernel, Linear, Mapping, MaxEntropy, Options, ParticleCentroid, Weights};
 use voidage::mesh::made::Made;
 use voidage::mesh::{Mesh, NONE};
 use voidage::smooth::{self, Active, Diffusion, Direction, Field, Graph, Scratch};
@@ -203,6 +204,86 @@ fn error() {
     }
 }
 
+/// The same on cells of any shape, along the links of the mesh's faces and of the Voronoi diagram of its centres.
+fn unstructured() {
+    println!(
+        "solid fraction against the exact Gaussian: relative L2 (÷ particle centroid with the same links, ÷ with faces)"
+    );
+    println!(
+        "linear: T = b2/4; max-entropy: half of its variance taken out; Euler: max-entropy by forward-euler"
+    );
+    println!(
+        "{:13} {:7} {:>4} {:>9} {:>16} {:>9} {:>23} {:>23} {:>23} {:>16}",
+        "mesh",
+        "bed",
+        "b/h",
+        "centroid",
+        "linear",
+        "V. centr.",
+        "V. linear",
+        "V. max-entropy",
+        "V. Euler",
+        "max-entropy"
+    );
+    let side = |n: usize, per: f64| [n as f64 * per.cbrt(); 3];
+    for (name, made) in [
+        ("hex", Made::hex([9; 3], side(9, 1.0))),
+        ("poly", Made::poly([6; 3], side(6, 2.0))),
+        ("tet even", Made::tet([5; 3], side(5, 6.0)).jiggled(0.0)),
+        ("tet", Made::tet([5; 3], side(5, 6.0))),
+        ("mirrored even", Made::tet([6; 3], side(6, 6.0)).mirrored().jiggled(0.0)),
+        ("mirrored", Made::tet([6; 3], side(6, 6.0)).mirrored()),
+    ] {
+        let mesh = made.mesh();
+        let linked = mesh.with_voronoi_links();
+        let mut entropy = MaxEntropy::default();
+        entropy.prepare(&mesh, &Options::default());
+        let cells = entropy.cell_variance(&mesh);
+        let taken = |m: &Mesh| -> Vec<f64> {
+            map::on_links(m, &cells).iter().map(|v| entropy.taken_out() * v.max(0.0)).collect()
+        };
+        let (faces, voronoi) = (taken(&mesh), taken(&linked));
+        for packed in [false, true] {
+            let mut position = spheres(&made, packed);
+            let host = locate(&mesh, &mut position);
+            let (radius, volume) = (vec![0.1; host.len()], vec![1.0; host.len()]);
+            for b in [0.7, 1.0, 2.0, 4.0] {
+                let field = |m: &mut dyn Mapping| {
+                    m.prepare(&mesh, &Options { bandwidth: b, grid: 1.0 });
+                    let mut w = Weights::default();
+                    m.weights(&mesh, &position, &radius, &host, &mut w);
+                    deposit(&mesh, &w, &volume)
+                };
+                let exact = field(&mut Kernel::default());
+                let [centroid, linear, entropy] = [
+                    field(&mut ParticleCentroid),
+                    field(&mut Linear::default()),
+                    field(&mut MaxEntropy::default()),
+                ];
+                let gap = |links: &Mesh, variance: Option<&[f64]>, method, phi: &[f64]| {
+                    let a = smooth(links, b, variance, method, phi);
+                    let sum = |f: &dyn Fn(usize) -> f64| {
+                        (0..mesh.len()).map(|i| mesh.volume[i] * f(i).powi(2)).sum::<f64>()
+                    };
+                    (sum(&|i| a[i] - exact[i]) / sum(&|i| exact[i])).sqrt()
+                };
+                let (c, v) = (gap(&mesh, None, EXACT, &centroid), gap(&linked, None, EXACT, &centroid));
+                let both = |e: f64| format!("{e:9.4} ({:5.2}, {:5.2})", v / e, c / e);
+                let one = |e: f64| format!("{e:8.4} ({:5.2})", c / e);
+                println!(
+                    "{name:13} {:7} {b:4.1} {c:9.4} {:>16} {v:9.4} {:>23} {:>23} {:>23} {:>16}",
+                    if packed { "packed" } else { "random" },
+                    one(gap(&mesh, None, EXACT, &linear)),
+                    both(gap(&linked, None, EXACT, &linear)),
+                    both(gap(&linked, Some(&voronoi), EXACT, &entropy)),
+                    both(gap(&linked, Some(&voronoi), EULER, &entropy)),
+                    one(gap(&mesh, Some(&faces), EXACT, &entropy)),
+                );
+            }
+        }
+    }
+}
+
 /// Solid fraction averaged over planes across z (height) and x, on meshes A to E, b = 4 d.
 fn bed() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/cases/fluidised-bed/bed.data");
@@ -283,7 +364,9 @@ fn bed() {
 
 fn main() {
     let what = std::env::args().nth(1).unwrap_or_default();
-    for (name, run) in [("cost", cost as fn()), ("error", error), ("bed", bed)] {
+    for (name, run) in
+        [("cost", cost as fn()), ("error", error), ("unstructured", unstructured), ("bed", bed)]
+    {
         if what.is_empty() || what == name {
             run();
         }

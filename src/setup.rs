@@ -114,11 +114,24 @@ pub fn pinned(c: &Config, mesh: &Mesh) -> Option<Pinned> {
     (c.file.coupling.void_velocity == "pinned").then(|| Pinned::new(mesh, &t.links(mesh)))
 }
 
-/// The smoother asked for and the positive one for redone steps, on the rows of all classes; `mesh` is the linked one.
-pub fn smoothers(c: &Config, mesh: &Mesh) -> Result<[Box<dyn Smoother>; 2], String> {
+/// What is taken out of T on each link for the variance that the deposit has itself, m2; `linked`: the mesh with the links.
+pub fn variance(mapping: &dyn Mapping, mesh: &Mesh, linked: &Mesh) -> Option<Vec<f64>> {
+    let share = mapping.taken_out();
+    let taken = |v: f64| (share * v).max(0.0);
+    let links = || map::on_links(linked, &mapping.cell_variance(mesh)).into_iter().map(taken).collect();
+    (share > 0.0).then(links)
+}
+
+/// The smoother asked for and the positive one for redone steps, on the rows of all classes; `mesh` is the linked one,
+/// `variance` is taken out.
+pub fn smoothers(
+    c: &Config,
+    mesh: &Mesh,
+    variance: Option<&[f64]>,
+) -> Result<[Box<dyn Smoother>; 2], String> {
     let s = &c.file.smooth;
-    let (classes, like) =
-        (classes(c, mesh), Diffusion { largest_cell: s.largest_cell, ..Diffusion::default() });
+    let like = Diffusion { largest_cell: s.largest_cell, variance, ..Diffusion::default() };
+    let classes = classes(c, mesh);
     let t = classes.links(mesh, &like);
     let unknown = || format!("smooth.method = \"{}\" is not known", s.method);
     if classes.count() == 1 {
@@ -130,8 +143,12 @@ pub fn smoothers(c: &Config, mesh: &Mesh) -> Result<[Box<dyn Smoother>; 2], Stri
 /// The coupling step of a case on a mesh.
 pub fn step(c: &Config, mesh: Mesh) -> Result<CouplingStep, String> {
     let mapping = mapping(c, &mesh)?;
-    let linked = threads::within(pool(c)?.as_ref(), || linked(c, &mesh));
-    let [smoother, positive] = smoothers(c, &linked)?;
+    let (linked, variance) = threads::within(pool(c)?.as_ref(), || {
+        let linked = linked(c, &mesh);
+        let variance = variance(&*mapping, &mesh, &linked);
+        (linked, variance)
+    });
+    let [smoother, positive] = smoothers(c, &linked, variance.as_deref())?;
     let (classes, pinned) = (classes(c, &mesh), pinned(c, &linked));
     drop(linked);
     let step = CouplingStep::new(mesh, setup(c)?, mapping, smoother, positive);

@@ -188,7 +188,7 @@ fn the_case_chooses_its_links() {
     let of = |links: &str| {
         let c = common::partners::case(&[("smooth.links", links)], 1);
         let linked = setup::linked(&c, &mesh);
-        assert!(setup::step(&c, mesh.clone()).is_ok() && setup::smoothers(&c, &linked).is_ok());
+        assert!(setup::step(&c, mesh.clone()).is_ok() && setup::smoothers(&c, &linked, None).is_ok());
         linked.links.clone()
     };
     assert_eq!(of("faces"), mesh.links);

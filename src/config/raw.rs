@@ -493,7 +493,7 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
         "map.method",
         "",
         map::DEFAULT,
-        "linear | particle-centroid (SX eq. 4; cheapest) | satellite-points (29) | divided-volume (exact overlap) | kernel (Gaussian of \
+        "linear | max-entropy (any cells; with smooth.links = voronoi on tetrahedra) | particle-centroid (SX eq. 4; cheapest) | satellite-points (29) | divided-volume (exact overlap) | kernel (Gaussian of \
          smooth.bandwidth; with smooth.method = none) | two-grid",
     ),
     ("map.grid", "m", "0", "two-grid: cell size of the coarse grid; 2 to 3 particle diameters"),

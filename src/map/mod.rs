@@ -6,7 +6,9 @@
 
 mod cells;
 mod divided;
+mod entropy;
 mod fill;
+mod images;
 mod kernel;
 mod linear;
 mod lists;
@@ -17,6 +19,7 @@ mod weights;
 
 pub use cells::{Cells, Facet};
 pub use divided::DividedVolume;
+pub use entropy::MaxEntropy;
 pub use kernel::Kernel;
 pub use linear::Linear;
 pub use satellite::SatellitePoints;
@@ -51,6 +54,14 @@ pub trait Mapping: Send + Sync {
     fn link_variance(&self, _mesh: &Mesh) -> Vec<f64> {
         Vec::new()
     }
+    /// The same by cell, without direction: mean over the particles of a cell (m2). `mesh` is the one it was prepared for. Empty: none.
+    fn cell_variance(&self, _mesh: &Mesh) -> Vec<f64> {
+        Vec::new()
+    }
+    /// Share of `cell_variance` that is taken out of the smoother's T along the links it goes by.
+    fn taken_out(&self) -> f64 {
+        0.0
+    }
     /// The deposit has the bandwidth already: nothing is to be smoothed after it.
     fn smooths(&self) -> bool {
         false
@@ -84,6 +95,12 @@ impl Mapping for ParticleCentroid {
 /// What is used unless another is asked for.
 pub const DEFAULT: &str = "linear";
 
+/// Numbers of cells on the links of a mesh: the mean of the two.
+pub fn on_links(mesh: &Mesh, cells: &[f64]) -> Vec<f64> {
+    let row = |i: usize| mesh.links(i).iter().map(move |l| 0.5 * (cells[i] + cells[l.to as usize]));
+    (0..mesh.len()).flat_map(row).collect()
+}
+
 /// All mappings.
 pub fn all() -> Vec<Box<dyn Mapping>> {
     vec![
@@ -91,6 +108,7 @@ pub fn all() -> Vec<Box<dyn Mapping>> {
         Box::<SatellitePoints>::default(),
         Box::<DividedVolume>::default(),
         Box::<Linear>::default(),
+        Box::<MaxEntropy>::default(),
         Box::<Kernel>::default(),
         Box::<TwoGrid>::default(),
     ]
