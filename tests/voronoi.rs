@@ -195,6 +195,36 @@ fn the_case_chooses_its_links() {
     assert_eq!(of("voronoi"), mesh.with_voronoi_links().links);
 }
 
+/// T of the links that smoothing goes by is b²/4 less half of the share of the deposit's variance, the same in both rows.
+#[test]
+fn what_the_deposit_spreads_is_taken_out_along_the_links_in_use() {
+    let mesh = Made::tet([6; 3], SIZE).mesh();
+    let case = |method| {
+        let set = [("smooth.links", "voronoi"), ("map.method", method)];
+        let c = common::partners::case(&set, 1);
+        let linked = setup::linked(&c, &mesh).into_owned();
+        let mapping = setup::mapping(&c, &mesh).unwrap();
+        assert!(setup::step(&c, mesh.clone()).is_ok());
+        (setup::variance(&*mapping, &mesh, &linked), linked)
+    };
+    assert_eq!(case("linear").0, None);
+    let (variance, linked) = case("max-entropy");
+    let variance = variance.unwrap();
+    let t = Diffusion { bandwidth: 0.01, variance: Some(&variance), ..Diffusion::default() }.links(&linked);
+    let mut mean = 0.0;
+    for i in 0..linked.len() {
+        for (k, l) in linked.links(i).iter().enumerate() {
+            let (at, j) = (linked.link_start[i] as usize + k, l.to as usize);
+            let back = linked.links(j).iter().position(|b| b.to as usize == i).unwrap();
+            assert_eq!(t[at], t[linked.link_start[j] as usize + back]);
+            assert!(t[at] < 0.25 * 0.01 * 0.01 && t[at] >= 0.0);
+            mean += variance[at] / (linked.volume[i].cbrt().powi(2) * t.len() as f64);
+        }
+    }
+    println!("taken out: {mean:.3} h2 on average");
+    assert!((0.05..0.2).contains(&mean), "{mean}");
+}
+
 fn smoothed(mesh: &Mesh, b: f64, lanes: &mut [[f64; 8]]) {
     let t = Diffusion::uniform(b).links(mesh);
     let mut s = smooth::by_name("chebyshev", mesh, &t, 1e-9).unwrap();

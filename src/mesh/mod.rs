@@ -9,6 +9,7 @@ mod clip;
 pub(crate) mod geometry;
 mod join;
 pub mod made;
+mod pairs;
 mod piece;
 mod voronoi;
 

@@ -5,21 +5,23 @@
 //! Across the faces of a mesh the two-point flux |S|/d is consistent only where the line between two centres is normal
 //! to their face; tetrahedra are far from that. Voronoi faces are normal to it by construction, so that away from walls
 //! Σ_j a_ij (x_j − x_i) = 0 and ½ Σ_ij a_ij d dᵀ = |Ω| I, exactly, on any mesh, with a_ij = a_ji > 0 (Eymard, Gallouët &
-//! Herbin 2000, §9.1: admissible meshes). On hexahedra of one size both are the same.
+//! Herbin 2000, §9.1: admissible meshes). On hexahedra of one size both are the same; on graded ones Voronoi cells are not
+//! as wide as the cells, and the links of the faces are to be preferred.
 //!
 //! Every cell's Voronoi cell is a box cut by bisectors with the centres around, nearest first, until none is near enough
 //! to cut. Centres are found by a walk through faces, through cyclics with their shift. At walls the Voronoi cell is cut
 //! by the planes of boundary faces, which is what the mirrored centre would do.
 //!
 //! Limits. A wall counts by the planes of its faces (warped: mean planes), those of the cell itself and those near it that
-//! leave the cell and its neighbours nearly whole; what lies beyond them is not seen, but for face neighbours. In domains that are not convex (steps,
-//! baffles, outside of tubes) the two cells of a link may see different parts of their common face: the mean is taken,
-//! which keeps symmetry and sign, and consistency is lost in those cells only. Round the edge of a baffle cells may be
-//! linked. What the mesh connects stays connected: a face between parts that would come apart keeps |S|/d.
+//! leave the cell and its neighbours nearly whole; what lies beyond them is not seen, but for face neighbours. In domains
+//! that are not convex (steps, baffles, outside of tubes) the two cells of a link may see different parts of their common
+//! face: the mean is taken, which keeps symmetry and sign, and consistency is lost in those cells only. Round the edge of a
+//! baffle cells may be linked. What the mesh connects stays connected: a face between parts that would come apart keeps |S|/d.
 //! Cost: 15 to 50 µs per cell, once. Does not depend on how the mesh is cut in pieces nor on threads.
 
 use super::clip::Convex;
 use super::geometry::{V, add, dot, length, sub};
+use super::pairs::both;
 use super::{Link, Mesh, NONE, Side};
 use crate::threads;
 use std::cmp::Reverse;
@@ -29,8 +31,6 @@ use std::collections::BinaryHeap;
 const TOUCHES: f64 = 1e-10;
 /// What of a cell may lie beyond a wall near it, relative to the cell: curved walls.
 const ROUND: f64 = 0.25;
-/// Smaller links than this, relative to the largest of a cell, come from rounding: centres on a sphere, as on lattices.
-const NOTHING: f64 = 1e-9;
 /// Cells that one thread takes at a time.
 const PIECE: usize = 4096;
 
@@ -239,78 +239,5 @@ fn links(mesh: &Mesh) -> (Vec<u32>, Vec<Link>) {
         seen.extend(all);
         start.extend(ends.into_iter().map(|e| e + from));
     }
-    join(mesh, &start, &seen)
-}
-
-/// The mean of what the two cells of each link see, and what keeps the mesh connected.
-fn join(mesh: &Mesh, start: &[usize], seen: &[(u32, f64)]) -> (Vec<u32>, Vec<Link>) {
-    let n = mesh.len();
-    let row = |i: usize| &seen[start[i]..start[i + 1]];
-    let largest = |i: usize| row(i).iter().map(|l| l.1).fold(0.0, f64::max);
-    // each pair once: (lower, higher, a)
-    let mut pairs: Vec<(u32, u32, f64)> = Vec::with_capacity(seen.len() / 2);
-    for i in 0..n {
-        for (j, a) in row(i) {
-            let back = row(*j as usize).binary_search_by_key(&(i as u32), |l| l.0);
-            let other = back.map_or(0.0, |k| row(*j as usize)[k].1);
-            let (low, high) = (*j.min(&(i as u32)), *j.max(&(i as u32)));
-            let mean = 0.5 * (a + other);
-            let first = i as u32 == low || back.is_err();
-            if first && mean > NOTHING * largest(low as usize).min(largest(high as usize)) {
-                pairs.push((low, high, mean));
-            }
-        }
-    }
-    let mut parts = Parts((0..n as u32).collect());
-    pairs.iter().for_each(|p| {
-        parts.unite(p.0, p.1);
-    });
-    for i in 0..n as u32 {
-        let mut row = mesh.links(i as usize).iter().filter(|l| l.to > i).peekable();
-        while let Some(l) = row.next() {
-            // several faces between the same cells
-            let mut weight = l.weight;
-            while let Some(more) = row.next_if(|m| m.to == l.to) {
-                weight += more.weight;
-            }
-            if parts.unite(i, l.to) {
-                pairs.push((i, l.to, weight));
-            }
-        }
-    }
-    let mut link_start = vec![0u32; n + 1];
-    for p in &pairs {
-        link_start[p.0 as usize + 1] += 1;
-        link_start[p.1 as usize + 1] += 1;
-    }
-    (0..n).for_each(|i| link_start[i + 1] += link_start[i]);
-    let mut at = link_start.clone();
-    let mut links = vec![Link { to: NONE, weight: 0.0 }; 2 * pairs.len()];
-    for (i, j, weight) in pairs {
-        for (from, to) in [(i, j), (j, i)] {
-            links[at[from as usize] as usize] = Link { to, weight };
-            at[from as usize] += 1;
-        }
-    }
-    (0..n).for_each(|i| links[link_start[i] as usize..link_start[i + 1] as usize].sort_by_key(|l| l.to));
-    (link_start, links)
-}
-
-/// Cells in parts that are connected: each points to one before it, the first of a part to itself.
-struct Parts(Vec<u32>);
-
-impl Parts {
-    fn first(&mut self, mut i: u32) -> u32 {
-        while self.0[i as usize] != i {
-            self.0[i as usize] = self.0[self.0[i as usize] as usize];
-            i = self.0[i as usize];
-        }
-        i
-    }
-    /// Were they apart?
-    fn unite(&mut self, i: u32, j: u32) -> bool {
-        let (i, j) = (self.first(i), self.first(j));
-        self.0[i.max(j) as usize] = i.min(j);
-        i != j
-    }
+    both(mesh, &start, &seen)
 }
