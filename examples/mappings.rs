@@ -209,9 +209,7 @@ fn unstructured() {
     println!(
         "solid fraction against the exact Gaussian: relative L2 (÷ particle centroid with the same links, ÷ with faces)"
     );
-    println!(
-        "linear: T = b2/4; max-entropy: half of its variance taken out; Euler: max-entropy by forward-euler"
-    );
+    println!("linear: T = b2/4; max-entropy: its variance taken out; Euler: max-entropy by forward-euler");
     println!(
         "{:13} {:7} {:>4} {:>9} {:>16} {:>9} {:>23} {:>23} {:>23} {:>16}",
         "mesh",

@@ -195,7 +195,7 @@ fn the_case_chooses_its_links() {
     assert_eq!(of("voronoi"), mesh.with_voronoi_links().links);
 }
 
-/// T of the links that smoothing goes by is b²/4 less half of the share of the deposit's variance, the same in both rows.
+/// T of the links that smoothing goes by is b²/4 less half of the deposit's variance, the same in both rows.
 #[test]
 fn what_the_deposit_spreads_is_taken_out_along_the_links_in_use() {
     let mesh = Made::tet([6; 3], SIZE).mesh();
@@ -222,7 +222,7 @@ fn what_the_deposit_spreads_is_taken_out_along_the_links_in_use() {
         }
     }
     println!("taken out: {mean:.3} h2 on average");
-    assert!((0.05..0.2).contains(&mean), "{mean}");
+    assert!((0.1..0.4).contains(&mean), "{mean}");
 }
 
 fn smoothed(mesh: &Mesh, b: f64, lanes: &mut [[f64; 8]]) {
@@ -425,7 +425,7 @@ fn what_shares_no_face_is_not_linked() {
 #[test]
 fn non_orthogonality_is_that_of_the_faces() {
     assert!(Made::hex([3, 4, 2], [3.0, 4.0, 2.0]).mesh().non_orthogonality() < 1e-5);
-    let skew = Made::tet([3; 3], [3.0; 3]).cyclic([true; 3]).mesh().non_orthogonality();
+    let skew = Made::tet([3; 3], [3.0; 3]).jiggled(0.0).cyclic([true; 3]).mesh().non_orthogonality();
     // 14.60699 by a second program, from the corners
     assert!((skew - 14.60699).abs() < 1e-4, "{skew}");
     assert!(Made::poly([3; 3], [3.0; 3]).mesh().non_orthogonality() < 1e-5);

@@ -10,9 +10,8 @@
 //! away from walls.
 //!
 //! The deposit has a variance of its own, about c² h²/2 per axis, nearly the same for all particles and without direction.
-//! Half of it beyond a cell's is taken out of T (`taken_out`), not all, since the discrete Gaussian of point masses in cells
-//! is too peaked; measured (`examples/mappings.rs unstructured`), three quarters are better at b/h up to 1 and on mirrored
-//! tetrahedra, half at b/h = 4 elsewhere.
+//! What it is beyond a cell's is taken out of T (`taken_out`): on tetrahedra, for which this deposit is, all of it is best or within 15 %
+//! of it up to b/h = 2; half would be better at b/h = 4 there and from 2 on on hexahedra and polyhedra (docs/bench.md).
 //! If Newton's method does not reach 1e-9 h (x outside of all centres in the bell, as between cells more than some four
 //! times as long as wide), the bell is widened by half, and again; weights are then not continuous. Beyond lengths of some
 //! twelve widths the last weights stand: their sum and sign are right, their first moment is not.
@@ -198,7 +197,7 @@ impl Mapping for MaxEntropy {
         "local maximum entropy (Arroyo & Ortiz 2006) with the cells' volumes as prior"
     }
     fn properties(&self) -> &'static str {
-        "conservative, positive, continuous, first moment exact on any mesh; own variance nearly uniform, half of it taken out of the \
+        "conservative, positive, continuous, first moment exact on any mesh; own variance nearly uniform, taken out of the \
          smoother's; some 56 cells; 4 to 8 us per particle and 12 to 35 us per occupied cell"
     }
     fn prepare(&mut self, mesh: &Mesh, _: &Options) {
@@ -210,7 +209,7 @@ impl Mapping for MaxEntropy {
         self.extent = (0..mesh.len()).map(far).collect();
     }
     fn taken_out(&self) -> f64 {
-        0.5
+        1.0
     }
     fn cell_variance(&self, mesh: &Mesh) -> Vec<f64> {
         let cells = Cells::new(mesh);
