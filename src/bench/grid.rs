@@ -15,7 +15,7 @@ const CROWDS: [f64; 3] = [0.5, 2.0, 8.0];
 /// The step on two threads.
 #[derive(Clone, Debug, Serialize)]
 pub struct Two {
-    /// wall time on one thread ÷ on two; particle centroid, N_p/N_c = 2
+    /// wall time on one thread ÷ on two; default mapping, N_p/N_c = 2
     pub step_speedup: f64,
     /// bandwidth of the triad on two threads ÷ on one, at the step's working set
     pub triad_speedup: f64,

@@ -11,7 +11,7 @@ use serde::Serialize;
 /// Bytes per thing.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Memory {
-    /// particle centroid, Chebyshev and uniformization on one graph
+    /// default mapping, smoother and uniformization on one graph
     pub bytes_per_cell: f64,
     /// with the scene's own table of particles
     pub bytes_per_particle: f64,
