@@ -230,7 +230,7 @@ fn exchange(
     println!("smoothing: {}, {} sweeps", step.smoother().name(), step.smoother().degree());
     if angle > SKEW && step.smoother().degree() > 0 && config.file.smooth.links == "faces" {
         println!(
-            "note: the mesh's non-orthogonality is {angle:.0} degrees on average, which distorts the kernel; smooth.links = \"voronoi\" \
+            "@warning the mesh's non-orthogonality is {angle:.0} degrees on average, which distorts the kernel; smooth.links = \"voronoi\" \
              does not (docs/bench.md)"
         );
     }
