@@ -114,7 +114,7 @@ fn cost() {
                 "{name:12} {:18} {:10.4} µs  {:6.1} cells",
                 m.name(),
                 best / n as f64 * 1e6,
-                w.cell.len() as f64 / n as f64
+                (0..n).map(|i| w.of(i).count()).sum::<usize>() as f64 / n as f64
             );
         }
     }
@@ -236,10 +236,7 @@ fn unstructured() {
         let linked = mesh.with_voronoi_links();
         let mut entropy = MaxEntropy::default();
         entropy.prepare(&mesh, &Options::default());
-        let cells = entropy.cell_variance(&mesh);
-        let taken = |m: &Mesh| -> Vec<f64> {
-            map::on_links(m, &cells).iter().map(|v| entropy.taken_out() * v.max(0.0)).collect()
-        };
+        let taken = |m: &Mesh| map::taken_out(&entropy, &mesh, m).unwrap_or_default();
         let (faces, voronoi) = (taken(&mesh), taken(&linked));
         for packed in [false, true] {
             let mut position = spheres(&made, packed);

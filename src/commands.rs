@@ -227,7 +227,8 @@ fn exchange(
     println!("mesh: {} cells of {} ranks", mesh.len(), session.cfd_ranks);
     let angle = mesh.non_orthogonality();
     let step = setup::step(config, mesh)?;
-    println!("smoothing: {}, {} sweeps", step.smoother().name(), step.smoother().degree());
+    let (asked, s) = (&config.file.smooth.method, step.smoother());
+    println!("smoothing: {asked} ({}), {} sweeps", s.name(), s.degree());
     if angle > SKEW && step.smoother().degree() > 0 && config.file.smooth.links == "faces" {
         println!(
             "@warning the mesh's non-orthogonality is {angle:.0} degrees on average, which distorts the kernel; smooth.links = \"voronoi\" \

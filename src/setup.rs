@@ -101,10 +101,13 @@ pub fn classes(c: &Config, mesh: &Mesh) -> Classes {
 
 /// The mesh with the links that smoothing goes along.
 pub fn linked<'a>(c: &Config, mesh: &'a Mesh) -> Cow<'a, Mesh> {
-    match c.file.smooth.links.as_str() {
-        "voronoi" => Cow::Owned(mesh.with_voronoi_links()),
-        _ => Cow::Borrowed(mesh),
-    }
+    let voronoi = c.file.smooth.links == "voronoi" && smooths(c);
+    if voronoi { Cow::Owned(mesh.with_voronoi_links()) } else { Cow::Borrowed(mesh) }
+}
+
+/// Something is smoothed.
+fn smooths(c: &Config) -> bool {
+    c.file.smooth.method != "none" || c.file.coupling.void_velocity == "pinned"
 }
 
 /// R's continuation of the solids velocity, if it is asked for; `mesh` is the linked one.
@@ -112,14 +115,6 @@ pub fn pinned(c: &Config, mesh: &Mesh) -> Option<Pinned> {
     let s = &c.file.smooth;
     let t = Diffusion { bandwidth: s.bandwidth, largest_cell: s.largest_cell, ..Diffusion::default() };
     (c.file.coupling.void_velocity == "pinned").then(|| Pinned::new(mesh, &t.links(mesh)))
-}
-
-/// What is taken out of T on each link for the variance that the deposit has itself, m2; `linked`: the mesh with the links.
-pub fn variance(mapping: &dyn Mapping, mesh: &Mesh, linked: &Mesh) -> Option<Vec<f64>> {
-    let share = mapping.taken_out();
-    let taken = |v: f64| (share * v).max(0.0);
-    let links = || map::on_links(linked, &mapping.cell_variance(mesh)).into_iter().map(taken).collect();
-    (share > 0.0).then(links)
 }
 
 /// The smoother asked for and the positive one for redone steps, on the rows of all classes; `mesh` is the linked one,
@@ -145,7 +140,7 @@ pub fn step(c: &Config, mesh: Mesh) -> Result<CouplingStep, String> {
     let mapping = mapping(c, &mesh)?;
     let (linked, variance) = threads::within(pool(c)?.as_ref(), || {
         let linked = linked(c, &mesh);
-        let variance = variance(&*mapping, &mesh, &linked);
+        let variance = if smooths(c) { map::taken_out(&*mapping, &mesh, &linked) } else { None };
         (linked, variance)
     });
     let [smoother, positive] = smoothers(c, &linked, variance.as_deref())?;

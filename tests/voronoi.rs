@@ -5,6 +5,7 @@
 mod common;
 
 use common::random;
+use voidage::map;
 use voidage::mesh::made::{Made, Shape};
 use voidage::mesh::{Mesh, assemble};
 use voidage::setup;
@@ -205,7 +206,7 @@ fn what_the_deposit_spreads_is_taken_out_along_the_links_in_use() {
         let linked = setup::linked(&c, &mesh).into_owned();
         let mapping = setup::mapping(&c, &mesh).unwrap();
         assert!(setup::step(&c, mesh.clone()).is_ok());
-        (setup::variance(&*mapping, &mesh, &linked), linked)
+        (map::taken_out(&*mapping, &mesh, &linked), linked)
     };
     assert_eq!(case("linear").0, None);
     let (variance, linked) = case("max-entropy");

@@ -501,7 +501,7 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
         "smooth.method",
         "",
         smooth::DEFAULT,
-        "gaussian (forward-euler where it takes no more sweeps than chebyshev, else chebyshev) | chebyshev | chebyshev-u | uniformization (positive by proof) | forward-euler (positive by proof; nearest to the Gaussian at b/h up to 2) | crank-nicolson | crank-nicolson-1 | backward-euler | constdiff | direct | none",
+        "gaussian (forward-euler where it takes no more sweeps than chebyshev and the tolerance is 1e-2 or more, else chebyshev) | chebyshev | chebyshev-u | uniformization (positive by proof) | forward-euler (positive by proof; nearest to the Gaussian at b/h up to 2) | crank-nicolson | crank-nicolson-1 | backward-euler | constdiff | direct | none",
     ),
     (
         "smooth.bandwidth",

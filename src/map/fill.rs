@@ -40,6 +40,8 @@ impl Weights {
     /// No particles.
     pub fn clear(&mut self) {
         self.near = None;
+        self.around.clear();
+        self.span.clear();
         self.start.clear();
         self.cell.clear();
         self.weight.clear();

@@ -95,10 +95,14 @@ impl Mapping for ParticleCentroid {
 /// What is used unless another is asked for.
 pub const DEFAULT: &str = "linear";
 
-/// Numbers of cells on the links of a mesh: the mean of the two.
-pub fn on_links(mesh: &Mesh, cells: &[f64]) -> Vec<f64> {
-    let row = |i: usize| mesh.links(i).iter().map(move |l| 0.5 * (cells[i] + cells[l.to as usize]));
-    (0..mesh.len()).flat_map(row).collect()
+/// What is taken out of T on each link for the variance that the deposit has itself, m2: of its two cells the mean. `mesh`: the one
+/// the mapping was prepared for; `linked`: the same cells with the links of the smoother. None: nothing.
+pub fn taken_out(mapping: &dyn Mapping, mesh: &Mesh, linked: &Mesh) -> Option<Vec<f64>> {
+    let share = mapping.taken_out();
+    let cells = if share > 0.0 { mapping.cell_variance(mesh) } else { return None };
+    let link = |i: usize, j: u32| (share * 0.5 * (cells[i] + cells[j as usize])).max(0.0);
+    let row = |i: usize| linked.links(i).iter().map(move |l| link(i, l.to));
+    Some((0..linked.len()).flat_map(row).collect())
 }
 
 /// All mappings.

@@ -8,7 +8,7 @@
 use super::linear::{Fraction, Rings};
 use super::near::Lines;
 use super::{lists, near};
-use crate::arrange::Order;
+use crate::arrange::{Order, Piece};
 use crate::mesh::{Mesh, NONE};
 use crate::smooth::Real;
 use crate::step::Lanes;
@@ -29,9 +29,9 @@ pub struct Weights {
     /// the cells around the host, and where each particle lies between the centres (`Rings::eight`)
     pub(super) near: Option<(Arc<Rings>, Vec<Fraction>)>,
     /// cells around the occupied ones, where `near` is used
-    around: Vec<u32>,
+    pub(super) around: Vec<u32>,
     /// lowest and highest cell that each piece of the particles goes to, if it may be another's
-    span: Vec<(u32, u32)>,
+    pub(super) span: Vec<(u32, u32)>,
 }
 
 impl Weights {
@@ -80,7 +80,7 @@ impl Weights {
             }
         });
     }
-    /// Cells that particles go to, with repetitions; `occupied` are their host cells.
+    /// Cells that particles go to, with repetitions; `occupied` are their host cells. After `survey`.
     pub fn reached<'a>(&'a self, occupied: &'a [u32]) -> &'a [u32] {
         match &self.near {
             Some(_) => &self.around,
@@ -101,37 +101,47 @@ impl Weights {
         quantity: impl Fn(usize, &mut A) -> Lanes + Sync,
     ) -> Vec<A> {
         let pieces = &order.pieces;
-        let runs = match self.span.len() {
-            _ if self.whole() => pieces.len(),
-            0 => 1,
-            _ => threads::count().min(pieces.len()),
+        // runs of pieces, one per thread; pieces of others that reach into the cells of a run are looked at too
+        let runs: Vec<Range<usize>> = if self.whole() {
+            (0..pieces.len()).map(|k| k..k + 1).collect()
+        } else {
+            let cut = |n: usize| {
+                let first = |k: usize| pieces.partition_point(|p| p.particles.start < k * order.inside / n);
+                (0..n).map(|k| first(k)..first(k + 1)).filter(|r| !r.is_empty()).collect::<Vec<_>>()
+            };
+            let many = cut(if self.span.is_empty() { 1 } else { threads::count() });
+            let work: usize = many.iter().map(|r| self.meeting(pieces, r).count()).sum();
+            // where cells that touch are far apart in the list, threads would do each other's work
+            if work * 2 > 3 * pieces.len() { cut(1) } else { many }
         };
-        let first = |k: usize| pieces.partition_point(|p| p.particles.start < k * order.inside / runs.max(1));
-        let mut runs: Vec<Range<usize>> = (0..runs).map(|k| first(k)..first(k + 1)).collect();
-        runs.retain(|r| !r.is_empty());
         let parts = threads::cut(lanes, runs.iter().map(|r| pieces[r.end - 1].slots.end));
         let sums = threads::map(runs.into_iter().zip(parts).collect(), |(run, part)| {
             let slots = pieces[run.start].slots.start..pieces[run.end - 1].slots.end;
             let (mut sums, mut batch) = (Vec::with_capacity(run.len()), Lines([[0.0; 8]; BATCH]));
-            for (k, piece) in pieces.iter().enumerate() {
-                let own = run.contains(&k);
-                let meets = |s: &(u32, u32)| (s.0 as usize) < slots.end && s.1 as usize >= slots.start;
-                if !own && !self.span.get(k).is_some_and(meets) {
-                    continue;
-                }
-                let mut all = A::default();
+            for k in self.meeting(pieces, &run) {
+                let (piece, mut all) = (&pieces[k], A::default());
                 for at in piece.particles.clone().step_by(BATCH) {
                     let batch = &mut batch.0[..BATCH.min(piece.particles.end - at)];
                     batch.iter_mut().enumerate().for_each(|(k, q)| *q = quantity(at + k, &mut all));
                     self.add(mesh, at, batch, slots.start, part);
                 }
-                if own {
+                if run.contains(&k) {
                     sums.push(all);
                 }
             }
             sums
         });
         sums.into_iter().flatten().collect()
+    }
+    /// The pieces of a run, and those of others that go to its cells.
+    fn meeting<'a>(&'a self, pieces: &'a [Piece], run: &'a Range<usize>) -> impl Iterator<Item = usize> + 'a {
+        let slots = pieces[run.start].slots.start..pieces[run.end - 1].slots.end;
+        let meets = move |k: &usize| {
+            let (low, high) = self.span[*k];
+            run.contains(k) || ((low as usize) < slots.end && high as usize >= slots.start)
+        };
+        let (alone, all) = if self.span.is_empty() { (run.clone(), 0..0) } else { (0..0, 0..pieces.len()) };
+        alone.chain(all.filter(meets))
     }
     /// `deposit` of the particles from `first` on, into the cells from `from` on that `part` holds.
     fn add(&self, mesh: &Mesh, first: usize, q: &[Lanes], from: usize, part: &mut [Lanes]) {

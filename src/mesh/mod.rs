@@ -139,6 +139,15 @@ impl Mesh {
     pub fn shift(&self, side: &Side) -> [f64; 3] {
         if side.shifts() { self.shifts[side.patch() as usize] } else { [0.0; 3] }
     }
+    /// Furthest corner of each cell from its centre, m.
+    pub fn extents(&self) -> Vec<f64> {
+        let far = |c: usize| {
+            let of =
+                |p: &u32| geometry::length(geometry::sub(self.faces.points[*p as usize], self.centre[c]));
+            self.loops(c).flatten().map(of).fold(0.0, f64::max)
+        };
+        (0..self.len()).map(far).collect()
+    }
     /// Mean angle between the faces' normals and the lines between the centres on both sides, by area, degrees (checkMesh:
     /// "mesh non-orthogonality average", there by face).
     pub fn non_orthogonality(&self) -> f64 {

@@ -31,8 +31,9 @@ use std::collections::BinaryHeap;
 const TOUCHES: f64 = 1e-10;
 /// What of a cell may lie beyond a wall near it, relative to the cell: curved walls.
 const ROUND: f64 = 0.25;
-/// Cells that one thread takes at a time.
+/// Cells that one thread takes at a time, at least, and pieces at most: each has numbers for all cells.
 const PIECE: usize = 4096;
+const PIECES: usize = 64;
 
 impl Mesh {
     /// Ids, centres, volumes and Voronoi links: all that smoothers look at; sides, faces and pieces are left out.
@@ -208,12 +209,9 @@ impl Walk<'_> {
 /// First link of each cell, and the links.
 fn links(mesh: &Mesh) -> (Vec<u32>, Vec<Link>) {
     let n = mesh.len();
-    let far = |c: usize| {
-        let of = |p: &u32| length(sub(mesh.faces.points[*p as usize], mesh.centre[c]));
-        mesh.loops(c).flatten().map(of).fold(0.0, f64::max)
-    };
-    let extent: Vec<f64> = (0..n).map(far).collect();
-    let pieces = (0..n).step_by(PIECE).map(|i| i..n.min(i + PIECE)).collect();
+    let extent = mesh.extents();
+    let piece = n.div_ceil(PIECES).max(PIECE);
+    let pieces = (0..n).step_by(piece).map(|i| i..n.min(i + piece)).collect();
     // rows as each cell sees them
     let parts = threads::map(pieces, |range| {
         let mut walk = Walk {

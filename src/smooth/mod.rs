@@ -150,6 +150,8 @@ pub const NAMES: &[&str] = &[
 
 /// Above this tolerance `chebyshev` keeps the kernel's variance exactly; below, the plain series is nearer to exp(Δ_T).
 const MATCHED: f64 = 1e-3;
+/// Tolerances from here on may be met by explicit Euler steps.
+const LOOSE: f64 = 1e-2;
 /// Normalised residual at which the implicit solves end (OpenFOAM's `tolerance`; the papers' baseline).
 const SOLVED: f64 = 1e-6;
 /// Steps of `backward-euler`.
@@ -179,10 +181,11 @@ pub fn on(
     let graph = Arc::clone(graph);
     Some(match name {
         DEFAULT => {
-            // where cells are about as large as b, steps of Euler are nearer to the particles' Gaussians, positive and no dearer
-            let euler = Polynomial::forward_euler(Arc::clone(&graph));
-            let series = Polynomial::chebyshev(graph, tolerance, tolerance > MATCHED);
-            Box::new(if euler.degree() <= series.degree() { euler } else { series })
+            // where cells are about as large as b, steps of Euler are nearer to the particles' Gaussians, positive and no dearer; but not
+            // within 1e-2 of exp(Δ_T), should that be asked for
+            let series = Polynomial::chebyshev(Arc::clone(&graph), tolerance, tolerance > MATCHED);
+            let euler = tolerance >= LOOSE && Polynomial::euler_steps(&graph) <= series.degree() as f64;
+            Box::new(if euler { Polynomial::forward_euler(graph) } else { series })
         }
         "chebyshev" => Box::new(Polynomial::chebyshev(graph, tolerance, tolerance > MATCHED)),
         "chebyshev-u" => Box::new(Polynomial::second_kind(graph, tolerance)),

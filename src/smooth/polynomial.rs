@@ -131,7 +131,7 @@ impl Polynomial {
     /// the Gaussian than exp(Δ_T) itself on hexahedra: a step's hops to the neighbours are rarer than those of the exact
     /// semigroup, whose kernel is too peaked and too wide at its foot (fourth cumulant along an axis: half).
     pub fn forward_euler(graph: Arc<Graph>) -> Self {
-        let steps = (2.0 * graph.diagonal * MARGIN).ceil().max(1.0);
+        let steps = Self::euler_steps(&graph);
         let factors = vec![factors::Factor::Real { root: 0.0 }; steps as usize];
         let properties = Properties {
             conservative: true,
@@ -143,6 +143,11 @@ impl Polynomial {
         };
         let form = Form::Product(Product { factors, scale: 1.0 / steps });
         Self { name: "forward-euler", graph, form, certified: true, properties }
+    }
+
+    /// Steps of `forward_euler`.
+    pub fn euler_steps(graph: &Graph) -> f64 {
+        (2.0 * graph.diagonal * MARGIN).ceil().max(1.0)
     }
 
     /// Positive by proof: uniformization always, Chebyshev when its coefficients in powers of X are.

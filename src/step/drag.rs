@@ -77,7 +77,6 @@ impl CouplingStep {
         let s = &self.setup;
         let (count, begin) = (BATCH.min(out.len() - at), begin + at);
         let fluid = if first { 0 } else { FLUID };
-        let around = s.drag.looks_around();
         b.slips.clear();
         b.vectors.clear();
         b.gathered.clear();
@@ -112,12 +111,13 @@ impl CouplingStep {
             b.vectors.push(vector);
             b.gathered.push(gathered);
         }
-        for k in 0..if around { count } else { 0 } {
-            let (l, host) = (&b.lanes[k], self.hosts[begin + k] as usize);
-            let around = Around { sauter_diameter: l[0] / l[7], cell_volume: self.mesh.volume[host] };
-            b.drag[k] = s.drag.drag_coefficient_in(&b.slips[k], &around);
-        }
-        if !around {
+        if s.drag.looks_around() {
+            for k in 0..count {
+                let (l, host) = (&b.lanes[k], self.hosts[begin + k] as usize);
+                let around = Around { sauter_diameter: l[0] / l[7], cell_volume: self.mesh.volume[host] };
+                b.drag[k] = s.drag.drag_coefficient_in(&b.slips[k], &around);
+            }
+        } else {
             s.drag.coefficients(&b.slips, &mut b.drag);
         }
         for k in 0..count {
