@@ -138,6 +138,20 @@ fn spheres(made: &Made, packed: bool) -> Vec<[f64; 3]> {
     (0..n.iter().product()).map(one).collect()
 }
 
+/// Spheres of volume 1 deposited by a mapping, made ready for bandwidth b.
+fn field(mesh: &Mesh, position: &[[f64; 3]], host: &[u32], b: f64, m: &mut dyn Mapping) -> Vec<f64> {
+    m.prepare(mesh, &Options { bandwidth: b, grid: 1.0 });
+    let mut w = Weights::default();
+    m.weights(mesh, position, &vec![0.1; host.len()], host, &mut w);
+    deposit(mesh, &w, &vec![1.0; host.len()])
+}
+
+/// L2 of the difference ÷ L2 of the exact field.
+fn relative(mesh: &Mesh, a: &[f64], exact: &[f64]) -> f64 {
+    let sum = |f: &dyn Fn(usize) -> f64| (0..mesh.len()).map(|i| mesh.volume[i] * f(i).powi(2)).sum::<f64>();
+    (sum(&|i| a[i] - exact[i]) / sum(&|i| exact[i])).sqrt()
+}
+
 /// Solid fraction error (L2 of the difference ÷ L2 of the exact field) of a bed in the corner of the box.
 fn error() {
     println!(
@@ -167,14 +181,8 @@ fn error() {
         for packed in [false, true] {
             let mut position = spheres(&made, packed);
             let host = locate(&mesh, &mut position);
-            let (radius, volume) = (vec![0.1; host.len()], vec![1.0; host.len()]);
             for b in [0.7, 1.0, 2.0, 4.0] {
-                let field = |m: &mut dyn Mapping| {
-                    m.prepare(&mesh, &Options { bandwidth: b, grid: 1.0 });
-                    let mut w = Weights::default();
-                    m.weights(&mesh, &position, &radius, &host, &mut w);
-                    deposit(&mesh, &w, &volume)
-                };
+                let field = |m: &mut dyn Mapping| field(&mesh, &position, &host, b, m);
                 let exact = match &lattice {
                     Some(lattice) => lattice.solid_fraction(&position, |_| 1.0, |_| b),
                     None => field(&mut Kernel::default()),
@@ -183,11 +191,7 @@ fn error() {
                 let (centroid, deposited) = (field(&mut ParticleCentroid), field(&mut linear));
                 let variance = linear.link_variance(&mesh);
                 let gap = |variance: Option<&[f64]>, method, phi: &[f64]| {
-                    let a = smooth(&links, b, variance, method, phi);
-                    let sum = |f: &dyn Fn(usize) -> f64| {
-                        (0..mesh.len()).map(|i| mesh.volume[i] * f(i).powi(2)).sum::<f64>()
-                    };
-                    (sum(&|i| a[i] - exact[i]) / sum(&|i| exact[i])).sqrt()
+                    relative(&mesh, &smooth(&links, b, variance, method, phi), &exact)
                 };
                 let c = gap(None, EXACT, &centroid);
                 let of = |e: f64| format!("{e:9.4} ({:5.2})", c / e);
@@ -241,14 +245,8 @@ fn unstructured() {
         for packed in [false, true] {
             let mut position = spheres(&made, packed);
             let host = locate(&mesh, &mut position);
-            let (radius, volume) = (vec![0.1; host.len()], vec![1.0; host.len()]);
             for b in [0.7, 1.0, 2.0, 4.0] {
-                let field = |m: &mut dyn Mapping| {
-                    m.prepare(&mesh, &Options { bandwidth: b, grid: 1.0 });
-                    let mut w = Weights::default();
-                    m.weights(&mesh, &position, &radius, &host, &mut w);
-                    deposit(&mesh, &w, &volume)
-                };
+                let field = |m: &mut dyn Mapping| field(&mesh, &position, &host, b, m);
                 let exact = field(&mut Kernel::default());
                 let [centroid, linear, entropy] = [
                     field(&mut ParticleCentroid),
@@ -256,11 +254,7 @@ fn unstructured() {
                     field(&mut MaxEntropy::default()),
                 ];
                 let gap = |links: &Mesh, variance: Option<&[f64]>, method, phi: &[f64]| {
-                    let a = smooth(links, b, variance, method, phi);
-                    let sum = |f: &dyn Fn(usize) -> f64| {
-                        (0..mesh.len()).map(|i| mesh.volume[i] * f(i).powi(2)).sum::<f64>()
-                    };
-                    (sum(&|i| a[i] - exact[i]) / sum(&|i| exact[i])).sqrt()
+                    relative(&mesh, &smooth(links, b, variance, method, phi), &exact)
                 };
                 let (c, v) = (gap(&mesh, None, EXACT, &centroid), gap(&linked, None, EXACT, &centroid));
                 let both = |e: f64| format!("{e:9.4} ({:5.2}, {:5.2})", v / e, c / e);

@@ -225,11 +225,12 @@ fn exchange(
     }
     let mesh = receive_mesh(partners).map_err(|e| e.to_string())?;
     println!("mesh: {} cells of {} ranks", mesh.len(), session.cfd_ranks);
-    let angle = mesh.non_orthogonality();
     let step = setup::step(config, mesh)?;
     let (asked, s) = (&config.file.smooth.method, step.smoother());
     println!("smoothing: {asked} ({}), {} sweeps", s.name(), s.degree());
-    if angle > SKEW && step.smoother().degree() > 0 && config.file.smooth.links == "faces" {
+    let along_faces = s.degree() > 0 && config.file.smooth.links == "faces";
+    let angle = if along_faces { step.mesh.non_orthogonality() } else { 0.0 };
+    if angle > SKEW {
         println!(
             "@warning the mesh's non-orthogonality is {angle:.0} degrees on average, which distorts the kernel; smooth.links = \"voronoi\" \
              does not (docs/bench.md)"

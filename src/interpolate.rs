@@ -53,8 +53,7 @@ pub fn gradient(mesh: &Mesh, fluid: &[[f64; 3]], host: usize) -> [[f64; 3]; 3] {
     let (mut m, mut b) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
     for side in mesh.sides(host).iter().filter(|s| s.across != crate::mesh::NONE) {
         let other = side.across as usize;
-        let shift = mesh.shift(side);
-        let r = [0, 1, 2].map(|a| mesh.centre[other][a] - shift[a] - mesh.centre[host][a]);
+        let r = mesh.way(host, side);
         let w = 1.0 / (r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
         for i in 0..3 {
             (0..3).for_each(|j| m[i][j] += w * r[i] * r[j]);

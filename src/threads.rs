@@ -49,6 +49,11 @@ pub fn both(a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
     rayon::join(a, b);
 }
 
+/// 0..count in pieces of `size`.
+pub fn pieces(count: usize, size: usize) -> Vec<Range<usize>> {
+    (0..count).step_by(size).map(|i| i..count.min(i + size)).collect()
+}
+
 /// `slice` cut at `ends` (ascending); an empty one into empty parts.
 pub fn cut<T>(mut slice: &mut [T], ends: impl IntoIterator<Item = usize>) -> Vec<&mut [T]> {
     let (mut at, none) = (0, slice.is_empty());

@@ -504,9 +504,15 @@ fn link_variance_is_that_of_cloud_in_cell() {
     }
 }
 
-/// Solid fraction of spheres of volume v, deposited and smoothed.
+/// Root of Σ V (a − b)².
+fn distance(mesh: &Mesh, a: &[f64], b: &[f64]) -> f64 {
+    (0..mesh.len()).map(|j| mesh.volume[j] * (a[j] - b[j]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Solid fraction of spheres of volume v, deposited and smoothed along links with a variance (m2) taken out.
 fn solid_fraction(
     mesh: &Mesh,
+    (linked, variance): (&Mesh, Option<&[f64]>),
     position: &[[f64; 3]],
     v: f64,
     b: f64,
@@ -524,8 +530,8 @@ fn solid_fraction(
     for i in 0..host.len() {
         w.of(i).for_each(|(c, m)| lanes[c][0] += m * v / mesh.volume[c]);
     }
-    let t = Diffusion::uniform(b).links(mesh);
-    let mut s = smooth::by_name(smoother, mesh, &t, tolerance).unwrap();
+    let t = Diffusion { bandwidth: b, variance, ..Diffusion::default() }.links(linked);
+    let mut s = smooth::by_name(smoother, linked, &t, tolerance).unwrap();
     s.apply(&mut lanes, &Active::whole(mesh.len()), Direction::Spread, &mut Scratch::default());
     lanes.iter().map(|l| l[0]).collect()
 }
@@ -544,9 +550,8 @@ fn linear_halves_the_error_on_uniform_and_graded_hexahedra() {
         for b in [0.7, 1.0, 2.0, 4.0] {
             let exact = lattice.solid_fraction(&x, |_| 1.0, |_| b);
             let error = |how| {
-                let of = solid_fraction(&mesh, &x, 1.0, b, how, 1e-8);
-                let cell = |j: usize| mesh.volume[j] * (of[j] - exact[j]).powi(2);
-                (0..mesh.len()).map(cell).sum::<f64>().sqrt()
+                let of = solid_fraction(&mesh, (&mesh, None), &x, 1.0, b, how, 1e-8);
+                distance(&mesh, &of, &exact)
             };
             let [centroid, linear] = ["particle-centroid", "linear"].map(|m| error([m, "chebyshev"]));
             assert!(centroid > 2.0 * linear, "{:?} b/h = {b}: {centroid} {linear}", made.grading);
@@ -567,39 +572,22 @@ fn maximum_entropy_halves_the_error_on_tetrahedra() {
     // two per cell in a corner of the box
     let x: Vec<[f64; 3]> =
         (0..324).map(|_| made.size.map(|s| s * (0.001 + 0.6 * random(&mut seed)))).collect();
-    let mut host = vec![NONE; x.len()];
-    Locator::new(&mesh).locate(&mesh, &mut x.clone(), &mut host).unwrap();
     let entropy = {
         let mut m = MaxEntropy::default();
         m.prepare(&mesh, &Options::default());
         map::taken_out(&m, &mesh, &linked).unwrap()
     };
     for b in [0.7, 1.0, 2.0, 4.0] {
-        let field = |name: &str, links: &Mesh, variance: Option<&[f64]>| {
-            let mut m = map::all().into_iter().find(|m| m.name() == name).unwrap();
-            m.prepare(&mesh, &Options { bandwidth: b, grid: 1.0 });
-            let mut w = Weights::default();
-            m.weights(&mesh, &x, &vec![0.1; x.len()], &host, &mut w);
-            let mut lanes = vec![[0.0; 8]; mesh.len()];
-            for i in 0..x.len() {
-                w.of(i).for_each(|(c, m)| lanes[c][0] += m / mesh.volume[c]);
-            }
-            if !m.smooths() {
-                let t = Diffusion { bandwidth: b, variance, ..Diffusion::default() }.links(links);
-                let mut s = smooth::by_name("chebyshev", links, &t, 1e-8).unwrap();
-                s.apply(&mut lanes, &Active::whole(mesh.len()), Direction::Spread, &mut Scratch::default());
-            }
-            lanes.iter().map(|l| l[0]).collect::<Vec<_>>()
+        let field = |mapping, smoother, linked, variance| {
+            solid_fraction(&mesh, (linked, variance), &x, 1.0, b, [mapping, smoother], 1e-8)
         };
-        let exact = field("kernel", &mesh, None);
-        let error = |f: &[f64]| {
-            let square = |f: &dyn Fn(usize) -> f64| {
-                (0..mesh.len()).map(|j| mesh.volume[j] * f(j).powi(2)).sum::<f64>()
-            };
-            (square(&|j| f[j] - exact[j]) / square(&|j| exact[j])).sqrt()
+        let exact = field("kernel", "none", &mesh, None);
+        let error = |mapping, linked, variance| {
+            distance(&mesh, &field(mapping, "chebyshev", linked, variance), &exact)
+                / distance(&mesh, &vec![0.0; mesh.len()], &exact)
         };
-        let ours = error(&field("max-entropy", &linked, Some(&entropy)));
-        let [faces, voronoi] = [&mesh, &linked].map(|links| error(&field("particle-centroid", links, None)));
+        let ours = error("max-entropy", &linked, Some(&entropy[..]));
+        let [faces, voronoi] = [&mesh, &linked].map(|links| error("particle-centroid", links, None));
         println!(
             "b/h = {b}: {ours:.4}; particle centroid by faces {faces:.4}, by Voronoi links {voronoi:.4}"
         );
@@ -624,7 +612,9 @@ fn the_bed_is_the_same_on_meshes_b_to_e() {
         let profile = |n: [usize; 3]| {
             let mesh = Made::hex(n, size).mesh();
             let mut sum = vec![0.0; n[1]];
-            for (j, f) in solid_fraction(&mesh, &x, v, 4.0 * d, how, tolerance).iter().enumerate() {
+            for (j, f) in
+                solid_fraction(&mesh, (&mesh, None), &x, v, 4.0 * d, how, tolerance).iter().enumerate()
+            {
                 sum[(mesh.centre[j][1] / size[1] * n[1] as f64) as usize] += f / (n[0] * n[2]) as f64;
             }
             sum

@@ -211,8 +211,7 @@ impl Mapping for MaxEntropy {
     }
     fn cell_variance(&self, mesh: &Mesh) -> Vec<f64> {
         let cells = Cells::new(mesh);
-        let pieces = (0..mesh.len()).step_by(PIECE).map(|c| c..mesh.len().min(c + PIECE)).collect();
-        let parts = threads::map(pieces, |range: std::ops::Range<usize>| {
+        let parts = threads::map(threads::pieces(mesh.len(), PIECE), |range| {
             let mut s = Scratch::default();
             range.map(|c| self.variance(mesh, &cells, c as u32, &mut s)).collect::<Vec<f64>>()
         });

@@ -23,8 +23,7 @@ impl Weights {
         if threads::count() == 1 {
             return run(0..host.len(), self);
         }
-        let pieces = (0..host.len()).step_by(PIECE).map(|i| i..host.len().min(i + PIECE)).collect();
-        let parts = threads::map(pieces, |range| {
+        let parts = threads::map(threads::pieces(host.len(), PIECE), |range| {
             let mut part = Self::default();
             part.clear();
             run(range, &mut part);

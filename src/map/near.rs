@@ -26,15 +26,31 @@ pub(super) fn run(host: &[u32], at: usize) -> usize {
     end
 }
 
-/// Adds m q / V of each particle to the cells from `from` on that `part` holds.
+/// A run of cells that a deposit may write.
+pub(super) struct Part<'a> {
+    /// of all cells, m3
+    pub volume: &'a [f64],
+    /// its first cell
+    pub from: usize,
+    pub cells: &'a mut [Lanes],
+}
+impl Part<'_> {
+    /// Adds m q / V to a cell, if it is one of the run.
+    #[inline(always)]
+    pub(super) fn add<S: Simd>(&mut self, s: S, cell: u32, m: f64, q: &Lanes) {
+        if let Some(to) = self.cells.get_mut((cell as usize).wrapping_sub(self.from)) {
+            axpy(s, m / self.volume[cell as usize], q, to);
+        }
+    }
+}
+
+/// Adds m q / V of each particle.
 pub(super) struct Add<'a> {
     pub rings: &'a Rings,
-    pub volume: &'a [f64],
     pub host: &'a [u32],
     pub fraction: &'a [Fraction],
     pub q: &'a [Lanes],
-    pub from: usize,
-    pub part: &'a mut [Lanes],
+    pub part: Part<'a>,
 }
 
 /// `to` += share × q
@@ -49,7 +65,7 @@ pub(super) fn axpy<S: Simd>(s: S, share: f64, q: &Lanes, to: &mut Lanes) {
 impl WithSimd for Add<'_> {
     type Output = ();
     #[inline(always)]
-    fn with_simd<S: Simd>(self, s: S) {
+    fn with_simd<S: Simd>(mut self, s: S) {
         let mut at = 0;
         let mut sum = Lines([[0.0; 8]; ROOM]);
         while at < self.host.len() {
@@ -59,9 +75,7 @@ impl WithSimd for Add<'_> {
                 for (fraction, q) in particles {
                     let (cells, weights) = self.rings.eight(host, *fraction);
                     for c in 0..8 {
-                        if let Some(to) = self.part.get_mut((cells[c] as usize).wrapping_sub(self.from)) {
-                            axpy(s, weights[c] / self.volume[cells[c] as usize], q, to);
-                        }
+                        self.part.add(s, cells[c], weights[c], q);
                     }
                 }
             } else {
@@ -72,10 +86,7 @@ impl WithSimd for Add<'_> {
                     }
                 }
                 for (sum, offset) in sum.0[..27].iter_mut().zip(self.rings.ring(host)) {
-                    let cell = host.wrapping_add_signed(*offset);
-                    if let Some(to) = self.part.get_mut((cell as usize).wrapping_sub(self.from)) {
-                        axpy(s, 1.0 / self.volume[cell as usize], sum, to);
-                    }
+                    self.part.add(s, host.wrapping_add_signed(*offset), 1.0, sum);
                     *sum = [0.0; 8];
                 }
             }

@@ -6,7 +6,7 @@
 //! is least to read: wholly in their host cells; between eight centres of a block; or cell by cell.
 
 use super::linear::{Fraction, Rings};
-use super::near::Lines;
+use super::near::{Lines, Part};
 use super::{lists, near};
 use crate::arrange::{Order, Piece};
 use crate::mesh::{Mesh, NONE};
@@ -15,6 +15,9 @@ use crate::step::Lanes;
 use crate::threads;
 use std::ops::Range;
 use std::sync::Arc;
+
+/// Particles whose numbers stay in the nearest cache.
+pub const BATCH: usize = 256;
 
 /// Weights of all particles: particle i goes to `cell[k]` by `weight[k]`, k from `start[i]` to `start[i+1]`; or,
 /// with `start` and `weight` empty, all by their host `cell[i]` (`NONE`: to none): wholly, or with those around (`near`).
@@ -42,9 +45,9 @@ impl Weights {
     }
     /// (cell, m) of particle i, for those stored cell by cell.
     #[inline(always)]
-    fn entries(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+    pub(super) fn entries(&self, i: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
         let range = self.start[i] as usize..self.start[i + 1] as usize;
-        self.cell[range.clone()].iter().zip(&self.weight[range]).map(|(c, m)| (*c as usize, *m))
+        self.cell[range.clone()].iter().copied().zip(self.weight[range].iter().copied())
     }
     /// (cell, m_ik) of particle i.
     pub fn of(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
@@ -54,11 +57,11 @@ impl Weights {
             _ if self.cell[i] == NONE => (),
             Some((rings, fraction)) => {
                 let (cell, m) = rings.eight(self.cell[i], fraction[i]);
-                list.extend(cell.into_iter().map(|c| c as usize).zip(m).filter(|e| e.1 > 0.0));
+                list.extend(cell.into_iter().zip(m).filter(|e| e.1 > 0.0));
             }
-            None => list.push((self.cell[i] as usize, 1.0)),
+            None => list.push((self.cell[i], 1.0)),
         }
-        list.into_iter()
+        list.into_iter().map(|(cell, m)| (cell as usize, m))
     }
     /// Once the weights are complete: what deposits and smoothers want to know of them beforehand.
     pub fn survey(&mut self, order: &Order) {
@@ -123,7 +126,7 @@ impl Weights {
                 for at in piece.particles.clone().step_by(BATCH) {
                     let batch = &mut batch.0[..BATCH.min(piece.particles.end - at)];
                     batch.iter_mut().enumerate().for_each(|(k, q)| *q = quantity(at + k, &mut all));
-                    self.add(mesh, at, batch, slots.start, part);
+                    self.add(at, batch, Part { volume: &mesh.volume, from: slots.start, cells: part });
                 }
                 if run.contains(&k) {
                     sums.push(all);
@@ -143,27 +146,18 @@ impl Weights {
         let (alone, all) = if self.span.is_empty() { (run.clone(), 0..0) } else { (0..0, 0..pieces.len()) };
         alone.chain(all.filter(meets))
     }
-    /// `deposit` of the particles from `first` on, into the cells from `from` on that `part` holds.
-    fn add(&self, mesh: &Mesh, first: usize, q: &[Lanes], from: usize, part: &mut [Lanes]) {
+    /// `deposit` of the particles from `first` on.
+    fn add(&self, first: usize, q: &[Lanes], part: Part) {
         let range = first..first + q.len();
         match &self.near {
             Some((rings, fraction)) => {
                 let (host, fraction) = (&self.cell[range.clone()], &fraction[range]);
-                f64::dispatch(near::Add { rings, volume: &mesh.volume, host, fraction, q, from, part });
+                f64::dispatch(near::Add { rings, host, fraction, q, part });
             }
             None if self.whole() => {
-                f64::dispatch(lists::AddWhole {
-                    volume: &mesh.volume,
-                    host: &self.cell[range],
-                    q,
-                    from,
-                    part,
-                });
+                f64::dispatch(lists::AddWhole { host: &self.cell[range], q, part });
             }
-            None => {
-                let start = &self.start[range.start..=range.end];
-                f64::dispatch(lists::Add { start, weights: self, volume: &mesh.volume, q, from, part });
-            }
+            None => f64::dispatch(lists::Add { weights: self, first, q, part }),
         }
     }
     /// Σ_k m_ik φ_k of the particles from `first` on, all with a host.
@@ -177,10 +171,7 @@ impl Weights {
             None if self.whole() => {
                 out.iter_mut().zip(&self.cell[range]).for_each(|(to, c)| *to = lanes[*c as usize]);
             }
-            None => {
-                let start = &self.start[range.start..=range.end];
-                f64::dispatch(lists::Gather { start, weights: self, lanes, out });
-            }
+            None => f64::dispatch(lists::Gather { weights: self, first, lanes, out }),
         }
     }
     /// Σ_k m_ik φ_k of particle i.
@@ -190,6 +181,3 @@ impl Weights {
         out[0]
     }
 }
-
-/// Particles whose numbers stay in the nearest cache.
-pub const BATCH: usize = 256;

@@ -139,6 +139,11 @@ impl Mesh {
     pub fn shift(&self, side: &Side) -> [f64; 3] {
         if side.shifts() { self.shifts[side.patch() as usize] } else { [0.0; 3] }
     }
+    /// From the centre of a cell to that across one of its sides, m.
+    pub fn way(&self, cell: usize, side: &Side) -> [f64; 3] {
+        let (to, shift, from) = (self.centre[side.across as usize], self.shift(side), self.centre[cell]);
+        [0, 1, 2].map(|a| to[a] - shift[a] - from[a])
+    }
     /// Furthest corner of each cell from its centre, m.
     pub fn extents(&self) -> Vec<f64> {
         let far = |c: usize| {
@@ -154,11 +159,10 @@ impl Mesh {
         let (mut sum, mut all) = (0.0, 0.0);
         for i in 0..self.len() {
             for s in self.sides(i).iter().filter(|s| s.across != NONE) {
-                let (j, shift) = (s.across as usize, self.shift(s));
-                let d = [0, 1, 2].map(|a| self.centre[j][a] - shift[a] - self.centre[i][a]);
+                let d = self.way(i, s);
                 let (n, size) = ([s.plane[0], s.plane[1], s.plane[2]], geometry::length(d));
                 // the link's weight × d is the area
-                let area = self.links(i).iter().find(|l| l.to as usize == j).map_or(0.0, |l| l.weight * size);
+                let area = self.links(i).iter().find(|l| l.to == s.across).map_or(0.0, |l| l.weight * size);
                 sum += area * (geometry::dot(n, d) / size).clamp(-1.0, 1.0).acos().to_degrees();
                 all += area;
             }

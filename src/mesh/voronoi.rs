@@ -211,9 +211,8 @@ fn links(mesh: &Mesh) -> (Vec<u32>, Vec<Link>) {
     let n = mesh.len();
     let extent = mesh.extents();
     let piece = n.div_ceil(PIECES).max(PIECE);
-    let pieces = (0..n).step_by(piece).map(|i| i..n.min(i + piece)).collect();
     // rows as each cell sees them
-    let parts = threads::map(pieces, |range| {
+    let parts = threads::map(threads::pieces(n, piece), |range| {
         let mut walk = Walk {
             mesh,
             extent: &extent,

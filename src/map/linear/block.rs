@@ -4,7 +4,7 @@
 //! weights between cell centres. Directions and distances that agree to nine digits count as one.
 
 use super::rings::{Fraction, OWN, Rings};
-use crate::mesh::geometry::{V, dot, length, scale, sub};
+use crate::mesh::geometry::{V, dot, length, scale};
 use crate::mesh::{Mesh, NONE, Side};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -29,10 +29,6 @@ const DIGITS: f64 = 1e9;
 
 fn out(s: &Side) -> V {
     [s.plane[0], s.plane[1], s.plane[2]]
-}
-/// The vector to the centre across.
-fn step(mesh: &Mesh, cell: usize, s: &Side) -> V {
-    sub(sub(mesh.centre[s.across as usize], mesh.shift(s)), mesh.centre[cell])
 }
 /// The only side towards `way`: which it is.
 fn place(mesh: &Mesh, cell: usize, way: V) -> Option<usize> {
@@ -152,7 +148,7 @@ impl Block {
                     let side = next(cell as usize, a, steps[a])?;
                     at = (side.across != NONE).then_some(side.across);
                     if at.is_some() {
-                        let d = step(mesh, cell as usize, side);
+                        let d = mesh.way(cell as usize, side);
                         (0..3).for_each(|b| sum[b] += d[b]);
                     }
                 }
@@ -204,7 +200,7 @@ fn candidate(mesh: &Mesh, cell: usize) -> Option<Candidate> {
             which[a][high] = k as u8;
             let side = &sides[k];
             if side.across != NONE {
-                let d = step(mesh, cell, side);
+                let d = mesh.way(cell, side);
                 let size = length(d);
                 if dot(d, way) < size * (1.0 - 1e-12) {
                     return None;

@@ -183,7 +183,7 @@ fn face_point(mesh: &Mesh, cells: &Cells, cell: u32, f: &Facet) -> (V, f64, Tens
     let (line, share) = if f.across == NONE {
         (scale(n, 2.0 * reach), 0.5)
     } else {
-        let d = sub(sub(mesh.centre[f.across as usize], mesh.shift(&mesh.sides[f.side as usize])), own);
+        let d = mesh.way(cell as usize, &mesh.sides[f.side as usize]);
         (d, (reach / dot(n, d)).clamp(0.0, 1.0))
     };
     let target = add(own, scale(line, share));

@@ -118,8 +118,7 @@ impl Mapping for Linear {
 /// between them; all sides between two cells lie on one line but for tiny cyclic boxes).
 fn way(mesh: &Mesh, low: usize, high: usize) -> Option<([f64; 3], f64)> {
     let side = mesh.sides(low).iter().find(|s| s.across as usize == high)?;
-    let shift = mesh.shift(side);
-    let d = [0, 1, 2].map(|a| mesh.centre[high][a] - shift[a] - mesh.centre[low][a]);
+    let d = mesh.way(low, side);
     let size = crate::mesh::geometry::length(d);
     (size > 0.0).then(|| (d.map(|x| x / size), size))
 }
