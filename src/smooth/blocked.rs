@@ -36,18 +36,30 @@ pub(super) struct Step {
 /// Blocks that a sweep advances at a time.
 const CHUNK: usize = 16;
 
-/// Sweeps at a time that are worth cutting layers for.
-const TOGETHER: usize = 4;
 /// Share of the cache that rows in flight may take.
-const SHARE: f64 = 0.7;
+const SHARE: f64 = 0.9;
+/// What a byte from memory costs, in bytes from a neighbouring strip, which are in the third level cache as a rule.
+const FAR: f64 = 1.5;
+/// What beginning a piece of a strip costs (60 ns), in such bytes.
+const PIECE: f64 = 3000.0;
 
-/// Rows and steps of one call.
+/// How the sweeps go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Plan {
+    /// so many at a time
+    depth: usize,
+    /// pieces of each layer; 1: whole
+    strips: usize,
+    /// the rows of a group come from far
+    fetch: bool,
+}
+
+/// Rows and steps of one group.
 struct Work<'a, T> {
     rows: &'a Rows<T>,
     active: &'a Active,
     steps: &'a [Step],
-    /// of each layer; 1: whole
-    strips: usize,
+    plan: Plan,
 }
 
 /// Runs all steps; the result is in field `steps.len()` mod 2.
@@ -55,41 +67,46 @@ pub(super) fn run<T: Real>(rows: &Rows<T>, active: &Active, steps: &[Step], fiel
     run_by(plan(rows, active, steps.len()), rows, active, steps, fields);
 }
 
-/// With so many sweeps at a time, if the threads' rows allow, and so many strips.
-fn run_by<T: Real>(
-    (depth, strips): (usize, usize),
-    rows: &Rows<T>,
-    active: &Active,
-    steps: &[Step],
-    [a, b]: [&mut [[T; 8]]; 2],
-) {
+/// By this plan, as far as the threads' rows allow.
+fn run_by<T: Real>(plan: Plan, rows: &Rows<T>, active: &Active, steps: &[Step], [a, b]: [&mut [[T; 8]]; 2]) {
     let cuts = cuts(active, steps.len());
     let narrowest = cuts.windows(2).map(|w| w[1] - w[0]).min().unwrap_or(0);
     let lag = lag(rows.width, BLOCK).max(1);
     // gaps of the last sweep must not meet
     let most = if cuts.len() > 2 { narrowest / (2 * lag) } else { usize::MAX };
-    // nor may a strip move back by more than its width
-    let wide = if strips > 1 { rows.width / strips / rows.within } else { usize::MAX };
-    let depth = depth.min(most).min(wide).max(1);
+    let depth = plan.depth.min(most).max(1);
     for (k, group) in steps.chunks(depth).enumerate() {
-        let work = Work { rows, active, steps: group, strips };
+        let work = Work { rows, active, steps: group, plan };
         if (k * depth).is_multiple_of(2) { work.run(&cuts, a, b) } else { work.run(&cuts, b, a) }
     }
 }
 
-/// How many of so many sweeps go together so that their rows fit into the cache, and in how many strips.
-fn plan<T>(rows: &Rows<T>, active: &Active, steps: usize) -> (usize, usize) {
-    let n = rows.d.len();
-    let share = active.rows_within(steps, n) as f64 / n.max(1) as f64;
-    let fit = SHARE * cache() / (16 * size_of::<T>() + rows.bytes) as f64;
-    let whole = (fit / (rows.width as f64 * share + (CHUNK * BLOCK) as f64)) as usize;
-    if whole >= TOGETHER || steps < 3 || rows.within == 0 {
-        return (whole, 1);
+/// What moves the fewest bytes into the second level cache and out of it. Of `depth` sweeps, depth + 2 layers (or layers of a strip) are in
+/// it. In each group a row is read and written once; in each sweep a strip reads one line of the one before, and overwrites two.
+fn plan<T>(rows: &Rows<T>, active: &Active, steps: usize) -> Plan {
+    let (n, field) = (rows.d.len(), (8 * size_of::<T>()) as f64);
+    let row = 2.0 * field + rows.bytes as f64;
+    let (fit, visited) = (SHARE * cache() / row, active.rows_within(steps, n) as f64);
+    let (within, layer) = (rows.within as f64, rows.width as f64 * visited / n.max(1) as f64);
+    let moved = |groups: usize| FAR * (row + 2.0 * field) * groups as f64 / steps as f64;
+    let mut best = Plan { depth: 1, strips: 1, fetch: visited > fit };
+    let mut least = moved(steps);
+    for groups in 1..if best.fetch { steps } else { 0 } {
+        let depth = steps.div_ceil(groups);
+        let wide = fit / (depth + 2) as f64 - 2.0 * within;
+        let strips = (rows.width as f64 / wide).ceil() as usize;
+        let (cost, strips) = if layer * (depth + 2) as f64 + (depth * CHUNK * BLOCK) as f64 <= fit {
+            (moved(groups), 1)
+        } else if within > 0.0 && wide > within && strips > 1 {
+            (moved(groups) + ((row + field) * within + PIECE) / wide, strips)
+        } else {
+            continue;
+        };
+        if cost < least {
+            (least, best) = (cost, Plan { depth, strips, ..best });
+        }
     }
-    // strips much wider than they move
-    let strips = (rows.width as f64 * TOGETHER as f64 / fit).ceil() as usize;
-    let strips = strips.min(rows.width / (8 * rows.within));
-    if strips < 2 { (whole, 1) } else { ((fit * strips as f64 / rows.width as f64) as usize, strips) }
+    best
 }
 
 /// Pieces of so many rows that a neighbour may be away.
@@ -116,7 +133,7 @@ impl<T: Real> Work<'_, T> {
         }
         let lag = lag(self.rows.width, BLOCK);
         if let [step] = self.steps {
-            let sweep = self.of(step, a, 0);
+            let sweep = self.of(0, a, 0);
             return if step.add { sweep.run::<OUT>(cuts, &[], b) } else { sweep.run::<ALONE>(cuts, &[], b) };
         }
         let rows = a.len();
@@ -131,7 +148,7 @@ impl<T: Real> Work<'_, T> {
         // each gap in as many pieces as keep all threads busy
         let threads = cuts.len() - 1;
         let each = threads.div_ceil(threads - 1);
-        for (k, step) in self.steps.iter().enumerate() {
+        for k in 0..self.steps.len() {
             let (now, out) = turn(k, &mut *a, &mut *b);
             let half = (k + 1) * lag;
             let pieces = cuts[1..threads].iter().flat_map(|c| {
@@ -142,7 +159,7 @@ impl<T: Real> Work<'_, T> {
             let ends = pieces.iter().flat_map(|p| [p.start * BLOCK, (p.end * BLOCK).min(now.len())]);
             let parts = threads::cut(out, ends).into_iter().skip(1).step_by(2);
             threads::map(pieces.iter().zip(parts).collect(), |(p, out)| {
-                self.sweep(step, now, 0, p.start * BLOCK, out);
+                self.sweep(k, now, 0, p.start * BLOCK, out);
             });
         }
     }
@@ -156,11 +173,11 @@ impl<T: Real> Work<'_, T> {
             let to = rows.end.min(r.end * BLOCK).min(end);
             if from < to {
                 let (now, out) = turn(k, &mut *a, &mut *b);
-                self.sweep(&self.steps[k], now, first, from, &mut out[from - first..to - first]);
+                self.sweep(k, now, first, from, &mut out[from - first..to - first]);
             }
         };
         let steps = 0..self.steps.len();
-        if self.strips < 2 {
+        if self.plan.strips < 2 {
             let chunk = BLOCK * CHUNK;
             let (n, lag) = ((end - first).div_ceil(chunk), lag(self.rows.width, chunk));
             for head in 0..n + lag * (steps.len() - 1) {
@@ -174,11 +191,11 @@ impl<T: Real> Work<'_, T> {
         }
         let layer = self.rows.width;
         let (low, high) = (first / layer, end.div_ceil(layer));
-        for strip in 0..self.strips {
+        for strip in 0..self.plan.strips {
             // the row where a strip of a layer begins; the first strip begins with the layer, the last ends with it
             let edge = |strip: usize, number: usize, k: usize| {
-                let moved = if strip == 0 || strip == self.strips { 0 } else { k * self.rows.within };
-                number * layer + strip * layer / self.strips - moved
+                let moved = if strip == self.plan.strips { 0 } else { k * self.rows.within };
+                number * layer + (strip * layer / self.plan.strips).saturating_sub(moved)
             };
             for head in low..high + steps.len() - 1 {
                 for k in steps.clone() {
@@ -190,15 +207,17 @@ impl<T: Real> Work<'_, T> {
         }
     }
 
-    /// A step as a sweep; `now` begins with row `base`.
-    fn of<'b>(&'b self, step: &Step, now: &'b [[T; 8]], base: usize) -> Sweep<'b, T> {
-        let &Step { factors, reach, zero, .. } = step;
-        Sweep { rows: self.rows, active: self.active, reach, zero, now, base, factors }
+    /// Step k as a sweep; `now` begins with row `base`.
+    fn of<'b>(&'b self, k: usize, now: &'b [[T; 8]], base: usize) -> Sweep<'b, T> {
+        let Step { factors, reach, zero, .. } = self.steps[k];
+        // what the first sweep asked for is near in the others
+        let fetch = self.plan.fetch && k == 0;
+        Sweep { rows: self.rows, active: self.active, reach, zero, now, base, factors, fetch }
     }
 
-    fn sweep(&self, step: &Step, now: &[[T; 8]], base: usize, first: usize, out: &mut [[T; 8]]) {
-        let sweep = self.of(step, now, base);
-        if step.add { sweep.part::<OUT>(first, out) } else { sweep.part::<ALONE>(first, out) }
+    fn sweep(&self, k: usize, now: &[[T; 8]], base: usize, first: usize, out: &mut [[T; 8]]) {
+        let sweep = self.of(k, now, base);
+        if self.steps[k].add { sweep.part::<OUT>(first, out) } else { sweep.part::<ALONE>(first, out) }
     }
 }
 
@@ -236,13 +255,14 @@ mod tests {
                 zero: if k == 0 { m as u16 + 1 } else { 0 },
             };
             let steps: Vec<Step> = (0..m).map(step).collect();
-            let of = |depth: (usize, usize), threads: usize| {
+            let of = |(depth, strips): (usize, usize), threads: usize| {
                 let mut fields = [vec![[0.0; 8]; mesh.len()], vec![[f64::NAN; 8]; mesh.len()]];
                 for j in &occupied {
                     fields[0][graph.row(*j) as usize] = [1.0 + 1e-3 * f64::from(*j); 8];
                 }
                 let [a, b] = &mut fields;
-                let run = || run_by(depth, &graph.rows, &active, &steps, [a, b]);
+                let run =
+                    || run_by(Plan { depth, strips, fetch: depth > 1 }, &graph.rows, &active, &steps, [a, b]);
                 rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(run);
                 let [_, b] = fields;
                 let seen = |b: &[f64; 8]| b.map(f64::to_bits);

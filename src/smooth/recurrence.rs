@@ -50,6 +50,7 @@ pub(super) fn apply<T: Real>(
         Sweep {
             rows,
             active,
+            fetch: true,
             reach,
             zero,
             now: &[],

@@ -13,6 +13,7 @@ use super::active::BLOCK;
 use super::graph::{LINE, Rows};
 use super::real::Real;
 use super::{Active, Direction};
+use prefetch_index::prefetch_index;
 use pulp::{Simd, WithSimd};
 
 /// What one sweep does, and to which rows.
@@ -30,7 +31,12 @@ pub(super) struct Sweep<'a, T> {
     pub base: usize,
     /// p, q, r, s
     pub factors: [f64; 4],
+    /// the rows come from far: asks for them ahead of time
+    pub fetch: bool,
 }
+
+/// Rows of a line that are asked for ahead: their way from memory takes as long as so many rows.
+const AHEAD: usize = 24;
 
 /// out = p x + q A x.
 pub(super) const ALONE: u8 = 0;
@@ -185,6 +191,11 @@ impl<T: Real, S: Simd, const KIND: u8> Rest<'_, T, S, KIND> {
             let mut x = T::vectors::<S>(&now[0])[lane];
             for i in 0..n {
                 let east = T::vectors::<S>(&far[W + 1][i])[lane];
+                if s.fetch {
+                    prefetch_index(far[N - 1], i + AHEAD);
+                    prefetch_index(&*out, i + AHEAD);
+                    prefetch_index(a, i + AHEAD);
+                }
                 let mut sum = T::splat(v, T::ZERO);
                 for k in 0..N {
                     let far = match k {
