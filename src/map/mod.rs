@@ -4,15 +4,18 @@
 //! Reads positions (m), radii (m), host cells; writes weights with Σ_k m_ik = 1. Deposit and gather are adjoint.
 //! New mappings implement `Mapping` and join `all`. Does not know what is deposited.
 
+mod bell;
 mod cells;
 mod divided;
 mod entropy;
+mod exp;
 mod fill;
 mod images;
 mod kernel;
 mod linear;
 mod lists;
 mod near;
+mod ring;
 mod satellite;
 mod two_grid;
 mod weights;
