@@ -146,7 +146,7 @@ def cells(mesh):
     points = [tuple(float(x) for x in p.split()) for p in re.findall(r"\(([^()]+)\)", _list(f"{mesh}/points"))]
     faces = [[int(i) for i in f.split()] for f in re.findall(r"\(([^()]+)\)", _list(f"{mesh}/faces"))]
     owner, neighbour = ([int(i) for i in _list(f"{mesh}/{name}").split()] for name in ("owner", "neighbour"))
-    n = max(owner) + 1
+    n = max(owner + neighbour) + 1
     sides = [[] for _ in range(n)]
     for i, face in enumerate(faces):
         sides[owner[i]].append((face, 1))

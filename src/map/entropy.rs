@@ -25,7 +25,7 @@
 
 use super::bell::{Bell, END, Solve, Table};
 use super::cells::Cells;
-use super::images::Around;
+use super::images::{Around, oblique};
 use super::ring::{Ring, Sizes};
 use super::{Mapping, Options, Weights};
 use crate::mesh::Mesh;
@@ -130,7 +130,7 @@ impl Mapping for MaxEntropy {
     fn prepare(&mut self, mesh: &Mesh, _: &Options) {
         let cells = mesh.centre.iter().zip(&mesh.volume);
         let cell = cells.map(|([x, y, z], v)| [*x, *y, *z, v.cbrt()]).collect();
-        self.sizes = Sizes { cell, extent: mesh.extents() };
+        self.sizes = Sizes { cell, extent: mesh.extents(), oblique: oblique(mesh) };
         self.rings = mesh.volume.iter().map(|_| OnceLock::new()).collect();
     }
     fn taken_out(&self) -> f64 {
@@ -187,6 +187,8 @@ mod tests {
             Made::tet([3, 2, 3], size),
             Made::tet([4, 2, 4], size).mirrored().cyclic([true, false, true]),
             Made::poly([4, 3, 3], size).cyclic(x),
+            Made::hex([6, 6, 5], size).round(),
+            Made::tet([4, 4, 4], size).mirrored().round(),
         ] {
             let mesh = made.mesh();
             let mut m = MaxEntropy::default();
@@ -198,7 +200,10 @@ mod tests {
                 let near = if i % 2 == 0 { 1.0 } else { 1e-3 };
                 let mut at = [size.map(|s| s * (1e-9 + near * random()))];
                 let mut host = [NONE];
-                Locator::new(&mesh).locate(&mesh, &mut at, &mut host).unwrap();
+                if Locator::new(&mesh).locate(&mesh, &mut at, &mut host).is_err() {
+                    assert!(made.round);
+                    continue;
+                }
                 let (h, missed) = m.one(&mesh, at[0], host[0], i % 3 > 0, &mut s);
                 assert!(missed < MISSED, "{made:?} {at:?}: {missed} of {h}");
                 // cells four times as long as wide do not see the next ones in the bell

@@ -26,6 +26,8 @@ pub(super) struct Sizes {
     pub cell: Vec<[f64; 4]>,
     /// furthest corner from the centre, m
     pub extent: Vec<f64>,
+    /// the mesh's walls are
+    pub oblique: bool,
 }
 
 /// f64::max without a thought for NaN.
@@ -43,7 +45,7 @@ impl Ring {
         let sides = mesh.sides(home);
         let across = sides.iter().filter(|f| f.across != NONE);
         let largest = across.map(|f| size(f.across)).fold(size(host), f64::max);
-        around.find(mesh, extent, host, extent[home] + end * largest);
+        around.find(mesh, extent, host, extent[home] + end * largest, sizes.oblique);
         let (points, centre) = (&mesh.faces.points, mesh.centre[home]);
         let mut corners: Vec<u32> = mesh.loops(home).flatten().copied().collect();
         corners.sort_unstable();
@@ -95,6 +97,7 @@ impl Ring {
 mod tests {
     use super::*;
     use crate::locate::Locator;
+    use crate::map::images::oblique;
     use crate::mesh::made::Made;
 
     /// Every cell whose own bell holds the particle, or that its bell holds, is in the ring of its host.
@@ -112,7 +115,7 @@ mod tests {
             let mesh = made.mesh();
             let cells = mesh.centre.iter().zip(&mesh.volume);
             let cell = cells.map(|([x, y, z], v)| [*x, *y, *z, v.cbrt()]).collect();
-            let sizes = Sizes { cell, extent: mesh.extents() };
+            let sizes = Sizes { cell, extent: mesh.extents(), oblique: oblique(&mesh) };
             let (mut around, mut seed) = (Around::default(), 4);
             let mut random = || crate::bench::scene::random(&mut seed);
             let (mut kept, mut all) = (0, 0);

@@ -35,11 +35,18 @@ fn lattice(m: &Made) -> Vec<V> {
                         p[a] += m.jiggle * hash(c, a) * cell;
                     }
                 }
-                points.push(p);
+                points.push(if m.round { bent(m, p) } else { p });
             }
         }
     }
     points
+}
+
+/// A square bent into a disc: lines of the lattice become arcs of ellipses.
+fn bent(m: &Made, p: V) -> V {
+    let [u, v] = [0, 1].map(|a| 2.0 * p[a] / m.size[a] - 1.0);
+    let [x, y] = [u * (1.0 - 0.5 * v * v).sqrt(), v * (1.0 - 0.5 * u * u).sqrt()];
+    [0.5 * m.size[0] * (x + 1.0), 0.5 * m.size[1] * (y + 1.0), p[2]]
 }
 
 fn corners(m: &Made) -> impl Iterator<Item = Corner> + use<> {

@@ -39,13 +39,15 @@ pub struct Made {
     pub cyclic: [bool; 3],
     /// tet: every other hexahedron along each axis is mirrored, so that the tetrahedra have no common direction
     pub mirrored: bool,
+    /// hex and tet: the box is bent into a cylinder along z (x and y with walls)
+    pub round: bool,
 }
 
 impl Made {
     /// A uniform box with walls.
     pub fn new(shape: Shape, n: [usize; 3], size: V) -> Self {
         let jiggle = if shape == Shape::Poly { 0.2 } else { 0.0 };
-        Self { shape, n, size, grading: [1.0; 3], jiggle, cyclic: [false; 3], mirrored: false }
+        Self { shape, n, size, grading: [1.0; 3], jiggle, cyclic: [false; 3], mirrored: false, round: false }
     }
     /// Uniform hexahedra.
     pub fn hex(n: [usize; 3], size: V) -> Self {
@@ -70,6 +72,10 @@ impl Made {
     /// Tetrahedra without a common direction; even numbers of lattice cells along cyclic axes.
     pub fn mirrored(self) -> Self {
         Self { mirrored: true, ..self }
+    }
+    /// Bent into a cylinder along z.
+    pub fn round(self) -> Self {
+        Self { round: true, ..self }
     }
     /// Inner points or seeds pushed about.
     pub fn jiggled(self, jiggle: f64) -> Self {
