@@ -10,8 +10,8 @@ use voidage::arrange::Order;
 use voidage::interpolate::FluidVelocity;
 use voidage::locate;
 use voidage::map::{self, Weights};
-use voidage::mesh::Mesh;
 use voidage::mesh::made::Made;
+use voidage::mesh::{Mesh, NONE};
 use voidage::particles::{Particles, Spare};
 use voidage::scheme::{self, History};
 use voidage::smooth::{self, Active, Diffusion, Direction, Scratch};
@@ -33,16 +33,18 @@ fn vectors(n: usize, scale: f64, seed: &mut u64) -> Vec<V> {
     (0..n).map(|_| [0; 3].map(|_: i32| scale * (2.0 * random(seed) - 1.0))).collect()
 }
 
-/// Hexahedra plain, graded or jiggled, tetrahedra, polyhedra; walls or cyclic in any axis.
+/// Hexahedra plain, graded or jiggled, tetrahedra, polyhedra, cylinders of hexahedra or tetrahedra; walls or cyclic in any axis.
 fn meshes() -> impl Strategy<Value = Mesh> {
     let n = prop::array::uniform3(3usize..6);
-    (0..5usize, n, prop::array::uniform3(any::<bool>())).prop_map(|(kind, n, cyclic)| {
+    (0..7usize, n, prop::array::uniform3(any::<bool>())).prop_map(|(kind, n, cyclic)| {
         let made = match kind {
             0 => Made::hex(n, SIZE),
             1 => Made::graded(n, SIZE),
             2 => Made::hex(n, SIZE).jiggled(0.3),
             3 => Made::tet(n.map(|c| c.min(3)), SIZE),
-            _ => Made::poly(n.map(|c| c.min(4)), SIZE),
+            4 => Made::poly(n.map(|c| c.min(4)), SIZE),
+            5 => Made::hex(n, SIZE).round(),
+            _ => Made::tet(n.map(|c| c.min(3)), SIZE).round(),
         };
         made.cyclic(if kind < 3 { cyclic } else { [false; 3] }).mesh()
     })
@@ -56,7 +58,10 @@ fn particles(mesh: &Mesh, n: usize, seed: u64) -> Particles {
     let radius: Vec<f64> = (0..n).map(|_| most * (0.2 + 0.8 * random(&mut s))).collect();
     let spread = |s: &mut u64| 10f64.powf(-8.0 * random(s));
     let (fast, owed) = (spread(&mut s), 1e-9 * spread(&mut s));
-    let inside = |s: &mut u64| [0, 1, 2].map(|a| SIZE[a] * (1e-3 + 0.998 * random(s)));
+    let (anywhere, locator) =
+        (|s: &mut u64| [0, 1, 2].map(|a| SIZE[a] * (1e-3 + 0.998 * random(s))), locate::Locator::new(mesh));
+    let holds = |x: V| locator.locate(mesh, &mut [x], &mut [NONE]).is_ok();
+    let inside = |s: &mut u64| std::iter::repeat_with(|| anywhere(s)).find(|x| holds(*x)).expect("endless");
     Particles {
         id: (0..n as i64).map(|i| 3 * i + 1).collect(),
         origin: (0..n as u32).map(|i| (0, i)).collect(),

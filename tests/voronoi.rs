@@ -37,11 +37,19 @@ fn shapes() -> Vec<Made> {
     ]
 }
 
+/// Walls that are curved.
+fn round() -> [Made; 2] {
+    [
+        Made::hex([6, 6, 5], SIZE).round(),
+        Made::tet([4; 3], SIZE).mirrored().round().cyclic([false, false, true]),
+    ]
+}
+
 #[test]
 fn links_are_positive_and_the_same_bits_in_both_rows_and_connect_all() {
     let walls = shapes().into_iter();
     let some = shapes().into_iter().map(|m| m.cyclic([true, false, false]));
-    for made in walls.chain(some).chain(shapes().into_iter().map(|m| m.cyclic(ALL))) {
+    for made in walls.chain(some).chain(shapes().into_iter().map(|m| m.cyclic(ALL))).chain(round()) {
         let mesh = made.mesh();
         let linked = mesh.with_voronoi_links();
         assert_eq!(linked.link_start.len(), mesh.len() + 1);
@@ -270,7 +278,7 @@ fn a_point_spreads_evenly_on_tetrahedra_of_one_direction() {
 
 #[test]
 fn smoothing_conserves_keeps_constants_and_is_self_adjoint() {
-    for made in shapes() {
+    for made in shapes().into_iter().chain(round()) {
         let mesh = made.mesh().with_voronoi_links();
         let mut seed = 3;
         let before: Vec<[f64; 8]> = (0..mesh.len())
