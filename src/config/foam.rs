@@ -86,12 +86,18 @@ pub fn start(case: &Path) -> Option<(f64, bool)> {
     Some((fastest, text.contains("noSlip") && !text.contains("type slip")))
 }
 
-/// Box of the mesh, from blockMeshDict or ascii polyMesh points.
+/// Box and size of the mesh: from constant/polyMesh, which a run takes if it is there, where it is ascii; else from blockMeshDict.
 pub fn extent(case: &Path) -> Option<Extent> {
-    from_block_mesh(case).or_else(|| {
-        let text = std::fs::read_to_string(case.join("constant/polyMesh/points")).ok()?;
-        bounds(&vectors(&plain(&text)), 1.0, None)
-    })
+    from_poly_mesh(&case.join("constant/polyMesh")).or_else(|| from_block_mesh(case))
+}
+
+fn from_poly_mesh(folder: &Path) -> Option<Extent> {
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).ok();
+    let text = read("points")?;
+    // OpenFOAM's tools note it in the head: "nPoints:304  nCells:972  nFaces:2178 …"
+    let cells =
+        read("owner").and_then(|t| t.split("nCells:").nth(1)?.split_whitespace().next()?.parse().ok());
+    bounds(&vectors(&plain(&text)), 1.0, cells)
 }
 
 /// "(x y z)" groups of numbers in a text.
@@ -137,12 +143,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn entries_are_found_past_comments() {
+    fn entries_are_found_past_comments_and_a_mesh_before_its_dictionary() {
         let text =
             "/* deltaT 3; */ // deltaT 4;\nFoamFile { version 2; }\nstartTime 0; endTime\n0.4; deltaT 2e-4;";
         assert_eq!(number(text, "deltaT"), Some(2e-4));
         assert_eq!(number(text, "endTime"), Some(0.4));
         assert_eq!(number("nu [0 2 -1 0 0 0 0] 1e-5;", "nu"), Some(1e-5));
+        let folder = std::env::temp_dir().join(format!("voidage-foam-{}", std::process::id()));
+        let mesh = folder.join("constant/polyMesh");
+        std::fs::create_dir_all(&mesh).unwrap();
+        std::fs::create_dir_all(folder.join("system")).unwrap();
+        let dict = "scale 1; vertices ((0 0 0) (9 9 9)); blocks (hex (0 1 2 3 4 5 6 7) (3 3 3) simpleGrading (1 1 1));";
+        std::fs::write(folder.join("system/blockMeshDict"), dict).unwrap();
+        assert_eq!(extent(&folder).and_then(|e| e.cells), Some(27));
+        // a mesh that is there is what runs, whatever dictionary lies beside it
+        std::fs::write(mesh.join("points"), "FoamFile { format ascii; }\n2\n(\n(0 0 0)\n(1 2.5 3)\n)")
+            .unwrap();
+        std::fs::write(mesh.join("owner"), "FoamFile { note \"nPoints:2  nCells:972  nFaces:2178\"; }")
+            .unwrap();
+        let found = extent(&folder).unwrap();
+        assert_eq!((found.upper, found.cells), ([1.0, 2.5, 3.0], Some(972)));
+        std::fs::remove_dir_all(&folder).unwrap();
         assert_eq!(vectors("((0 0 0) (1 2.5 3) (a b c)) (4 5)"), [[0.0; 3], [1.0, 2.5, 3.0]]);
     }
 }

@@ -68,7 +68,8 @@ pub fn of(c: &Config, particles: u64, cells: u64) -> Forecast {
 /// Of a case, as far as its files tell; the error says what they do not.
 pub fn forecast(c: &Config) -> Result<Forecast, String> {
     let cells = foam::extent(&c.fluid_case()).and_then(|e| e.cells);
-    let cells = cells.ok_or("the number of cells is not in system/blockMeshDict")?;
+    let cells =
+        cells.ok_or("the number of cells is in neither constant/polyMesh/owner nor system/blockMeshDict")?;
     let s = script::read(&c.script(), &c.file.dem.variables)?;
     let n = s.count.or(s.placed).ok_or("the script reads no data file that tells the number of particles")?;
     Ok(of(c, n as u64, cells as u64))
