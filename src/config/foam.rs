@@ -2,6 +2,7 @@
 //! The few facts of an OpenFOAM case that the checks need. Reads plain dictionaries (no macros, no includes);
 //! what it cannot read is `None`, never a guess.
 
+use std::io::Read;
 use std::path::Path;
 
 /// system/controlDict.
@@ -86,18 +87,21 @@ pub fn start(case: &Path) -> Option<(f64, bool)> {
     Some((fastest, text.contains("noSlip") && !text.contains("type slip")))
 }
 
-/// Box and size of the mesh: from constant/polyMesh, which a run takes if it is there, where it is ascii; else from blockMeshDict.
+/// Box of the mesh: from the points of constant/polyMesh, which a run takes if it is there, where they are ascii; else from blockMeshDict. Its number of
+/// cells from constant/polyMesh/owner, ascii or not, else from blockMeshDict.
 pub fn extent(case: &Path) -> Option<Extent> {
-    from_poly_mesh(&case.join("constant/polyMesh")).or_else(|| from_block_mesh(case))
+    let folder = case.join("constant/polyMesh");
+    let text = std::fs::read_to_string(folder.join("points")).ok();
+    let found =
+        text.and_then(|t| bounds(&vectors(&plain(&t)), 1.0, None)).or_else(|| from_block_mesh(case))?;
+    Some(Extent { cells: noted(&folder.join("owner")).or(found.cells), ..found })
 }
 
-fn from_poly_mesh(folder: &Path) -> Option<Extent> {
-    let read = |name: &str| std::fs::read_to_string(folder.join(name)).ok();
-    let text = read("points")?;
-    // OpenFOAM's tools note it in the head: "nPoints:304  nCells:972  nFaces:2178 …"
-    let cells =
-        read("owner").and_then(|t| t.split("nCells:").nth(1)?.split_whitespace().next()?.parse().ok());
-    bounds(&vectors(&plain(&text)), 1.0, cells)
+/// What OpenFOAM's tools note in the head of the file: "nPoints:304  nCells:972  nFaces:2178 …".
+fn noted(owner: &Path) -> Option<usize> {
+    let mut head = Vec::new();
+    std::fs::File::open(owner).ok()?.take(4096).read_to_end(&mut head).ok()?;
+    String::from_utf8_lossy(&head).split("nCells:").nth(1)?.split_whitespace().next()?.parse().ok()
 }
 
 /// "(x y z)" groups of numbers in a text.

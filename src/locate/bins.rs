@@ -38,7 +38,7 @@ impl Bins {
     }
 }
 
-/// The cells of each bin, ascending: some 8 entries of 4 bytes per cell.
+/// The cells of each bin, ascending: 8 to 30 entries of 4 bytes per cell.
 #[derive(Clone, Debug)]
 pub struct Lists {
     start: Vec<u32>,

@@ -175,7 +175,7 @@ impl Locator {
 }
 
 /// Largest gap or overlap between cells of a warped mesh that a point may lie in, relative to the cell size.
-const GAP: f64 = 0.1;
+pub(crate) const GAP: f64 = 0.1;
 
 /// How far `x` lies beyond the worst side of a cell (0: inside); none: not in it.
 fn violated(mesh: &Mesh, cell: usize, x: &[f64; 3], planar: bool) -> Option<f64> {

@@ -5,6 +5,7 @@
 //! it for its own bell, to tell the local size, nor for the widest bell of the local sizes. Lengths m.
 
 use super::images::Around;
+use crate::locate::GAP;
 use crate::mesh::geometry::{V, dot, length, sub};
 use crate::mesh::{Mesh, NONE};
 
@@ -27,7 +28,7 @@ pub(super) struct Sizes {
     /// furthest corner from the centre, m
     pub extent: Vec<f64>,
     /// the mesh's walls are
-    pub oblique: bool,
+    pub bent: bool,
 }
 
 /// f64::max without a thought for NaN.
@@ -45,7 +46,7 @@ impl Ring {
         let sides = mesh.sides(home);
         let across = sides.iter().filter(|f| f.across != NONE);
         let largest = across.map(|f| size(f.across)).fold(size(host), f64::max);
-        around.find(mesh, extent, host, extent[home] + end * largest, sizes.oblique);
+        around.find(mesh, extent, host, extent[home] + end * largest, sizes.bent);
         let (points, centre) = (&mesh.faces.points, mesh.centre[home]);
         let mut corners: Vec<u32> = mesh.loops(home).flatten().copied().collect();
         corners.sort_unstable();
@@ -61,13 +62,15 @@ impl Ring {
             (n, more(side, corner))
         });
         let planes: Vec<(V, f64)> = planes.collect();
+        // between warped faces a particle may lie outside of its host
+        let slack = if plane { 1e-6 * extent[home] } else { GAP * size(host) };
         // distance of a place from the host, no more than it is
         let away = |x: V| {
             let d = sub(x, centre);
             let far = length(d);
             // beyond all corners, seen from there; the place itself, if it is the centre
             let ahead = if plane && far > 0.0 { far - furthest(d) / far } else { far - extent[home] };
-            planes.iter().map(|(n, top)| dot(*n, d) - top).fold(ahead, more) - 1e-6 * extent[home]
+            planes.iter().map(|(n, top)| dot(*n, d) - top).fold(ahead, more) - slack
         };
         let seen = around.seen().map(|(c, at)| (c, at, away(at.unwrap_or(mesh.centre[c as usize]))));
         let seen: Vec<(u32, Option<V>, f64)> = seen.collect();
@@ -97,7 +100,7 @@ impl Ring {
 mod tests {
     use super::*;
     use crate::locate::Locator;
-    use crate::map::images::oblique;
+    use crate::map::images::bent;
     use crate::mesh::made::Made;
 
     /// Every cell whose own bell holds the particle, or that its bell holds, is in the ring of its host.
@@ -115,7 +118,7 @@ mod tests {
             let mesh = made.mesh();
             let cells = mesh.centre.iter().zip(&mesh.volume);
             let cell = cells.map(|([x, y, z], v)| [*x, *y, *z, v.cbrt()]).collect();
-            let sizes = Sizes { cell, extent: mesh.extents(), oblique: oblique(&mesh) };
+            let sizes = Sizes { cell, extent: mesh.extents(), bent: bent(&mesh) };
             let (mut around, mut seed) = (Around::default(), 4);
             let mut random = || crate::bench::scene::random(&mut seed);
             let (mut kept, mut all) = (0, 0);
@@ -141,6 +144,9 @@ mod tests {
             shares.push((kept / 300, all / 300));
         }
         println!("kept, of found: {shares:?}");
-        assert!(shares.iter().all(|(kept, all)| kept < all));
+        assert!(
+            shares.iter().all(|(kept, all)| kept <= all)
+                && shares.iter().filter(|(kept, all)| kept < all).count() > 2
+        );
     }
 }

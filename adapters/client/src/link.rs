@@ -132,7 +132,7 @@ impl Link {
         };
         let sample = wait(&mut self.channel, self.limit, check).map_err(|e| match e {
             TransportError::Silent { peer, seconds } => format!(
-                "{peer} sent nothing for {seconds:.0} s (twice limits.wait and 10 s more, as it waits for others itself)"
+                "{peer} sent nothing for {seconds:.0} s (partners wait longer than limits.wait: the coupler waits for others first)"
             ),
             e => e.to_string(),
         })?;

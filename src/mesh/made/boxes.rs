@@ -35,15 +35,22 @@ fn lattice(m: &Made) -> Vec<V> {
                         p[a] += m.jiggle * hash(c, a) * cell;
                     }
                 }
-                points.push(if m.round { bent(m, p) } else { p });
+                points.push(bent(m, p));
             }
         }
     }
     points
 }
 
-/// A square bent into a disc: lines of the lattice become arcs of ellipses.
+/// A square bent into a disc, lines of the lattice become arcs of ellipses; or x into the radius and y into the angle of half a ring.
 fn bent(m: &Made, p: V) -> V {
+    if m.ring {
+        let (r, turn) = (m.size[0] + p[0], std::f64::consts::PI * p[1] / m.size[1]);
+        return [r * turn.sin(), 2.0 * m.size[0] - r * turn.cos(), p[2]];
+    }
+    if !m.round {
+        return p;
+    }
     let [u, v] = [0, 1].map(|a| 2.0 * p[a] / m.size[a] - 1.0);
     let [x, y] = [u * (1.0 - 0.5 * v * v).sqrt(), v * (1.0 - 0.5 * u * u).sqrt()];
     [0.5 * m.size[0] * (x + 1.0), 0.5 * m.size[1] * (y + 1.0), p[2]]

@@ -41,13 +41,25 @@ pub struct Made {
     pub mirrored: bool,
     /// hex and tet: the box is bent into a cylinder along z (x and y with walls)
     pub round: bool,
+    /// hex and tet: the box is bent into half a ring around z, its inner radius as large as its width
+    pub ring: bool,
 }
 
 impl Made {
     /// A uniform box with walls.
     pub fn new(shape: Shape, n: [usize; 3], size: V) -> Self {
         let jiggle = if shape == Shape::Poly { 0.2 } else { 0.0 };
-        Self { shape, n, size, grading: [1.0; 3], jiggle, cyclic: [false; 3], mirrored: false, round: false }
+        Self {
+            shape,
+            n,
+            size,
+            grading: [1.0; 3],
+            jiggle,
+            cyclic: [false; 3],
+            mirrored: false,
+            round: false,
+            ring: false,
+        }
     }
     /// Uniform hexahedra.
     pub fn hex(n: [usize; 3], size: V) -> Self {
@@ -76,6 +88,10 @@ impl Made {
     /// Bent into a cylinder along z.
     pub fn round(self) -> Self {
         Self { round: true, ..self }
+    }
+    /// Bent into half a ring around z: walls that are curved outwards and inwards.
+    pub fn ring(self) -> Self {
+        Self { ring: true, ..self }
     }
     /// Inner points or seeds pushed about.
     pub fn jiggled(self, jiggle: f64) -> Self {
