@@ -81,7 +81,7 @@ impl Lattice {
 
     /// Of a mesh whose cells are the boxes of such a block; none for any other mesh.
     pub fn of_mesh(mesh: &Mesh) -> Option<Self> {
-        let bounds: Vec<[[f64; 3]; 2]> = (0..mesh.len()).map(|j| bounds(mesh, j)).collect();
+        let bounds: Vec<[[f64; 3]; 2]> = (0..mesh.len()).map(|j| mesh.bounds_of(j)).collect();
         let size = (0..3).map(|a| mesh.bounds[1][a] - mesh.bounds[0][a]).fold(0.0, f64::max);
         let same = |x: f64, y: f64| (x - y).abs() <= 1e-9 * size;
         let axes = [0, 1, 2].map(|a| {
@@ -142,17 +142,6 @@ impl Lattice {
         }
         by_cell
     }
-}
-
-/// Lower and upper corner of a cell, m.
-fn bounds(mesh: &Mesh, cell: usize) -> [[f64; 3]; 2] {
-    let mut b = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    for p in mesh.loops(cell).flatten().map(|p| mesh.faces.points[*p as usize]) {
-        for a in 0..3 {
-            (b[0][a], b[1][a]) = (b[0][a].min(p[a]), b[1][a].max(p[a]));
-        }
-    }
-    b
 }
 
 /// ε_s of spheres of volume `sphere` (m3) in every cell of `scene::mesh(scene::BOX, cells)`, b in m.

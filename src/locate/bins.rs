@@ -49,11 +49,7 @@ impl Lists {
     /// Cells whose box, grown by `margin` (in cube roots of their volume), meets the bin.
     pub fn new(mesh: &Mesh, bins: &Bins, margin: f64) -> Self {
         let ranges = |cell: usize| {
-            let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-            for p in mesh.loops(cell).flatten() {
-                let p = mesh.faces.points[*p as usize];
-                (0..3).for_each(|a| (low[a], high[a]) = (low[a].min(p[a]), high[a].max(p[a])));
-            }
+            let [low, high] = mesh.bounds_of(cell);
             let grow = margin * mesh.volume[cell].cbrt();
             [bins.along(low.map(|x| x - grow)), bins.along(high.map(|x| x + grow))]
         };

@@ -227,7 +227,7 @@ impl Around {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::made::Made;
+    use crate::mesh::made::{Bend, Made};
 
     /// Behind walls curved outwards or inwards each place is seen once: the cells around fill a ball, whatever walls cut it; cells are counted whole by their centres, and
     /// some behind the edge between two walls are not reached.
@@ -245,7 +245,7 @@ mod tests {
             let mesh = made.mesh();
             let (extent, radius) = (mesh.extents(), 0.015);
             let bent = bent(&mesh);
-            assert_eq!(bent, made.round || made.ring);
+            assert_eq!(bent, made.bend != Bend::None);
             let mut around = Around::default();
             let (mut least, mut most, mut mean) = (f64::INFINITY, 0.0f64, 0.0);
             for home in 0..mesh.len() {

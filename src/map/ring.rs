@@ -27,7 +27,7 @@ pub(super) struct Sizes {
     pub cell: Vec<[f64; 4]>,
     /// furthest corner from the centre, m
     pub extent: Vec<f64>,
-    /// the mesh's walls are
+    /// the mesh's walls are (`images::bent`)
     pub bent: bool,
 }
 
@@ -48,10 +48,7 @@ impl Ring {
         let largest = across.map(|f| size(f.across)).fold(size(host), f64::max);
         around.find(mesh, extent, host, extent[home] + end * largest, sizes.bent);
         let (points, centre) = (&mesh.faces.points, mesh.centre[home]);
-        let mut corners: Vec<u32> = mesh.loops(home).flatten().copied().collect();
-        corners.sort_unstable();
-        corners.dedup();
-        let corners: Vec<V> = corners.iter().map(|p| sub(points[*p as usize], centre)).collect();
+        let corners: Vec<V> = mesh.corners(home).iter().map(|p| sub(points[*p as usize], centre)).collect();
         let furthest = |n: V| corners.iter().map(|p| dot(n, *p)).fold(f64::NEG_INFINITY, more);
         // beyond which plane no point of the host lies, by its sides' normals: its corners, or the side's plane where it is warped
         let mut plane = true;

@@ -135,6 +135,23 @@ impl Mesh {
         let range = self.side_start[slot] as usize..self.side_start[slot + 1] as usize;
         self.faces.of_side[range].iter().map(|f| self.faces.corners(*f))
     }
+    /// Numbers of a cell's points, ascending, each once.
+    pub fn corners(&self, slot: usize) -> Vec<u32> {
+        let mut all: Vec<u32> = self.loops(slot).flatten().copied().collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+    /// Lower and upper corner of the box around a cell, m.
+    pub fn bounds_of(&self, slot: usize) -> [[f64; 3]; 2] {
+        let mut b = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        for p in self.loops(slot).flatten().map(|p| self.faces.points[*p as usize]) {
+            for a in 0..3 {
+                (b[0][a], b[1][a]) = (b[0][a].min(p[a]), b[1][a].max(p[a]));
+            }
+        }
+        b
+    }
     /// What is added to a position that leaves through a side, m.
     pub fn shift(&self, side: &Side) -> [f64; 3] {
         if side.shifts() { self.shifts[side.patch() as usize] } else { [0.0; 3] }

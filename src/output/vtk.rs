@@ -120,12 +120,6 @@ impl Grid {
     pub fn new(mesh: &Mesh) -> Self {
         let mut a = Appended::default();
         let n = mesh.len();
-        let corners = |slot| {
-            let mut c: Vec<u32> = mesh.loops(slot).flatten().copied().collect();
-            c.sort_unstable();
-            c.dedup();
-            c
-        };
         let offsets = |lengths: Vec<usize>| {
             lengths.into_iter().scan(0i64, |sum, l| {
                 *sum += l as i64;
@@ -138,8 +132,8 @@ impl Grid {
             format!("<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{n}\">\n<Points>\n", points.len());
         body += &a.floats("Points", &Data::Vector(points));
         body += "</Points>\n<Cells>\n";
-        body += &a.integers("connectivity", (0..n).flat_map(corners).map(i64::from));
-        body += &a.integers("offsets", offsets((0..n).map(|c| corners(c).len()).collect()));
+        body += &a.integers("connectivity", (0..n).flat_map(|slot| mesh.corners(slot)).map(i64::from));
+        body += &a.integers("offsets", offsets((0..n).map(|c| mesh.corners(c).len()).collect()));
         body += &a.array("types", "UInt8", 1, std::iter::repeat_n([42], n));
         let faces = (0..n).flat_map(|slot| {
             let list = |f: &[u32]| {

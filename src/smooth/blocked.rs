@@ -90,8 +90,11 @@ fn plan<T>(rows: &Rows<T>, active: &Active, steps: usize) -> Plan {
     let (within, layer) = (rows.within as f64, rows.width as f64 * visited / n.max(1) as f64);
     let moved = |groups: usize| FAR * (row + 2.0 * field) * groups as f64 / steps as f64;
     let mut best = Plan { depth: 1, strips: 1, fetch: visited > fit };
+    if !best.fetch {
+        return best;
+    }
     let mut least = moved(steps);
-    for groups in 1..if best.fetch { steps } else { 0 } {
+    for groups in 1..steps {
         let depth = steps.div_ceil(groups);
         let wide = fit / (depth + 2) as f64 - 2.0 * within;
         let strips = (rows.width as f64 / wide).ceil() as usize;

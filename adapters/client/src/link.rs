@@ -130,12 +130,7 @@ impl Link {
                 Err(TransportError::Died { peer: peer.clone(), pid: coupler.pid })
             }
         };
-        let sample = wait(&mut self.channel, self.limit, check).map_err(|e| match e {
-            TransportError::Silent { peer, seconds } => format!(
-                "{peer} sent nothing for {seconds:.0} s (partners wait longer than limits.wait: the coupler waits for others first)"
-            ),
-            e => e.to_string(),
-        })?;
+        let sample = wait(&mut self.channel, self.limit, check).map_err(|e| e.to_string())?;
         let (kind, text) = {
             let f = Frame::parse(&sample).map_err(|e| e.to_string())?;
             (f.kind(), if f.kind() == kind::STOP { f.text() } else { String::new() })

@@ -25,8 +25,10 @@ pub enum TransportError {
         /// process number
         pid: u32,
     },
-    /// Nothing came in time.
-    #[error("{peer} sent nothing for {seconds:.1} s (limits.wait)")]
+    /// Nothing came in time; only partners wait this way, the coupler has words of its own.
+    #[error(
+        "{peer} sent nothing for {seconds:.0} s (partners wait longer than limits.wait: the coupler waits for others first)"
+    )]
     Silent {
         /// who
         peer: String,

@@ -3,7 +3,7 @@
 //! the main diagonal, so neighbours and opposite sides of the box fit; every other one mirrored if asked for).
 
 use super::super::geometry::{V, cross, dot, sub};
-use super::{Across, Made, Soup, hash};
+use super::{Across, Bend, Made, Soup, hash};
 use std::collections::HashMap;
 
 type Corner = [usize; 3];
@@ -44,16 +44,18 @@ fn lattice(m: &Made) -> Vec<V> {
 
 /// A square bent into a disc, lines of the lattice become arcs of ellipses; or x into the radius and y into the angle of half a ring.
 fn bent(m: &Made, p: V) -> V {
-    if m.ring {
-        let (r, turn) = (m.size[0] + p[0], std::f64::consts::PI * p[1] / m.size[1]);
-        return [r * turn.sin(), 2.0 * m.size[0] - r * turn.cos(), p[2]];
+    match m.bend {
+        Bend::None => p,
+        Bend::Cylinder => {
+            let [u, v] = [0, 1].map(|a| 2.0 * p[a] / m.size[a] - 1.0);
+            let [x, y] = [u * (1.0 - 0.5 * v * v).sqrt(), v * (1.0 - 0.5 * u * u).sqrt()];
+            [0.5 * m.size[0] * (x + 1.0), 0.5 * m.size[1] * (y + 1.0), p[2]]
+        }
+        Bend::HalfRing => {
+            let (r, turn) = (m.size[0] + p[0], std::f64::consts::PI * p[1] / m.size[1]);
+            [r * turn.sin(), 2.0 * m.size[0] - r * turn.cos(), p[2]]
+        }
     }
-    if !m.round {
-        return p;
-    }
-    let [u, v] = [0, 1].map(|a| 2.0 * p[a] / m.size[a] - 1.0);
-    let [x, y] = [u * (1.0 - 0.5 * v * v).sqrt(), v * (1.0 - 0.5 * u * u).sqrt()];
-    [0.5 * m.size[0] * (x + 1.0), 0.5 * m.size[1] * (y + 1.0), p[2]]
 }
 
 fn corners(m: &Made) -> impl Iterator<Item = Corner> + use<> {

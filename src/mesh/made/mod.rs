@@ -21,6 +21,17 @@ pub enum Shape {
     Poly,
 }
 
+/// What a box is bent into; x and y have walls then.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bend {
+    /// it stays a box
+    None,
+    /// a cylinder along z
+    Cylinder,
+    /// half a ring around z, its inner radius as large as its width
+    HalfRing,
+}
+
 /// A box of cells with its lower corner at the origin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Made {
@@ -39,10 +50,8 @@ pub struct Made {
     pub cyclic: [bool; 3],
     /// tet: every other hexahedron along each axis is mirrored, so that the tetrahedra have no common direction
     pub mirrored: bool,
-    /// hex and tet: the box is bent into a cylinder along z (x and y with walls)
-    pub round: bool,
-    /// hex and tet: the box is bent into half a ring around z, its inner radius as large as its width
-    pub ring: bool,
+    /// hex and tet: what the box is bent into
+    pub bend: Bend,
 }
 
 impl Made {
@@ -57,8 +66,7 @@ impl Made {
             jiggle,
             cyclic: [false; 3],
             mirrored: false,
-            round: false,
-            ring: false,
+            bend: Bend::None,
         }
     }
     /// Uniform hexahedra.
@@ -87,11 +95,11 @@ impl Made {
     }
     /// Bent into a cylinder along z.
     pub fn round(self) -> Self {
-        Self { round: true, ..self }
+        Self { bend: Bend::Cylinder, ..self }
     }
     /// Bent into half a ring around z: walls that are curved outwards and inwards.
     pub fn ring(self) -> Self {
-        Self { ring: true, ..self }
+        Self { bend: Bend::HalfRing, ..self }
     }
     /// Inner points or seeds pushed about.
     pub fn jiggled(self, jiggle: f64) -> Self {
