@@ -271,7 +271,7 @@ fn parcels_by_type_are_those_of_one_ratio_and_a_missing_type_is_named() {
     let kinds = |f: fn(i64) -> i64| {
         move |p: &Particles| Asked { kind: p.id.iter().map(|i| f(*i)).collect(), ..Asked::default() }
     };
-    for drag in ["koch-hill", "beetstra-polydisperse"] {
+    for drag in ["koch-hill", "beetstra-polydisperse", "cello"] {
         let with = |extra| Setup { drag: forces::by_name(drag).unwrap(), ..setup(false, extra) };
         let by = |list: &[f64]| Extra { ratio_by_type: list.to_vec(), ..Extra::default() };
         let all = exchange(&case, &messages, with(Extra { ratio: 2.0, ..Extra::default() }), &nothing);
@@ -296,6 +296,42 @@ fn parcels_by_type_are_those_of_one_ratio_and_a_missing_type_is_named() {
     let mut p = table(&messages, &step, &nothing);
     let e = step.before_fluid(&mut p, true).unwrap_err().to_string();
     assert!(e.contains("dem.coarse_graining needs the particles' types"), "{e}");
+}
+
+/// In a box of one cell what is around a particle is everything: Cello's law from sums over all particles, by two ways of adding.
+#[test]
+fn the_law_of_cello_sees_the_diameters_around() {
+    let hex = Hex { n: [1; 3], size: SIZE, jiggle: 0.0, cyclic_x: false };
+    let messages = [message(&mixed(2000))];
+    let law = forces::by_name("cello").unwrap();
+    for (ratio, list) in [(1.0, &[][..]), (2.0, &[]), (1.0, &LIST)] {
+        let case = Case { hex: &hex, cut: false, list, linear: false };
+        let extra = Extra { ratio, ..Extra::default() };
+        let like = setup(false, extra);
+        let fluid_constants = [like.kinematic_viscosity, like.density];
+        let mut step = case.step(Setup { drag: law, fluid_velocity: FluidVelocity::HostCell, ..like });
+        let f = fluid(&step.mesh);
+        let mut p = table(&messages, &step, &nothing);
+        step.before_fluid(&mut p, true).unwrap();
+        step.after_fluid(&p, &f, true).unwrap();
+        let diameter = |i: usize| 2.0 * p.radius[i] / ratio;
+        let moment = |k: i32| sum((0..p.len()).map(|i| p.volume(i) * diameter(i).powi(k)));
+        let voidage = 1.0 - moment(0) / step.mesh.volume[0];
+        let around = forces::Around {
+            sauter_diameter: moment(0) / moment(-1),
+            mean_diameter: moment(1) / moment(0),
+            cell_volume: step.mesh.volume[0],
+        };
+        assert!(around.mean_diameter > 1.03 * around.sauter_diameter);
+        for i in 0..p.len() {
+            let u = [0, 1, 2].map(|a| f.velocity[0][a] - p.velocity[i][a]);
+            let speed = u.iter().map(|u| u * u).sum::<f64>().sqrt();
+            let [kinematic_viscosity, density] = fluid_constants;
+            let slip = forces::Slip { diameter: diameter(i), voidage, speed, kinematic_viscosity, density };
+            let k = law.drag_coefficient_in(&slip, &around) * ratio.powi(3);
+            assert!((step.drive.drag_coefficient[i] / k - 1.0).abs() < 1e-9, "{i}: {k}");
+        }
+    }
 }
 
 #[test]

@@ -370,7 +370,7 @@ fn a_capped_voidage_keeps_the_third_law() {
 fn action_is_reaction_with_lift_added_mass_parcels_and_their_stress() {
     for hex in meshes() {
         let list = [message(&cloud(3000, SIZE, 4e-4))];
-        for drag in ["koch-hill", "beetstra-polydisperse"] {
+        for drag in ["koch-hill", "beetstra-polydisperse", "cello"] {
             let with = |extra| {
                 let drag = forces::by_name(drag).unwrap();
                 let plain = setup("conservative", FluidVelocity::Gather, false);

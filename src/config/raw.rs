@@ -547,7 +547,7 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
         "-",
         "stokes schiller-naumann di-felice rong di-felice-tang di-felice-tang-cfdem gidaspow gidaspow-blended \
          ergun-wen-yu ergun wen-yu beetstra beetstra-cpl beetstra-polydisperse beetstra-filtered koch-hill tenneti \
-         tenneti-nga2 tang syamlal-obrien no-correction none",
+         tenneti-nga2 tang cello syamlal-obrien no-correction none",
     ),
     ("forces.pressure_gradient", "", "true", "-V grad p on the particles (model A)"),
     ("forces.viscous_stress", "", "true", "V div tau on the particles (model A)"),

@@ -49,6 +49,8 @@ impl Slip {
 pub struct Around {
     /// d_S = Σ d³ / Σ d² of the particles around, m
     pub sauter_diameter: f64,
+    /// d̄ = Σ d⁴ / Σ d³, m; only for laws that want it, else 0
+    pub mean_diameter: f64,
     /// volume of the host cell, m3
     pub cell_volume: f64,
 }
@@ -63,6 +65,10 @@ pub trait DragLaw: Sync {
     fn drag_coefficient(&self, slip: &Slip) -> f64;
     /// True: `drag_coefficient_in` is to be called, not `drag_coefficient`.
     fn looks_around(&self) -> bool {
+        false
+    }
+    /// True: `Around::mean_diameter` is to be formed, which takes one more smoothing.
+    fn wants_mean_diameter(&self) -> bool {
         false
     }
     /// K where the law depends on what is around the particle.
@@ -133,6 +139,7 @@ mod tests {
             ("tenneti", 0.137337),
             ("ergun-wen-yu", 0.137337),
             ("tang", 0.128392),
+            ("cello", 0.143869),
         ];
         for (name, expected) in expected {
             let law = by_name(name).unwrap();
@@ -210,6 +217,7 @@ mod tests {
             ("beetstra", 0.99, 1.03),
             ("beetstra-cpl", 0.99, 1.03),
             ("tang", 0.99, 1.03),
+            ("cello", 1.0, 1.03),
             ("ergun", 0.833, 0.8334),
             ("gidaspow", 0.833, 0.8334),
             ("ergun-wen-yu", 0.833, 0.8334),
@@ -228,7 +236,7 @@ mod tests {
     fn polydisperse_drag_follows_the_diameter_ratio_and_options_reach_their_law() {
         let s = Slip { diameter: 2e-3, voidage: 0.5, speed: 1e-9, kinematic_viscosity: 1e-5, density: 1.2 };
         let law = by_name("beetstra-polydisperse").unwrap();
-        let around = Around { sauter_diameter: 1e-3, cell_volume: 1e-6 };
+        let around = Around { sauter_diameter: 1e-3, mean_diameter: 0.0, cell_volume: 1e-6 };
         let f = law.drag_coefficient_in(&s, &around) / by_name("beetstra").unwrap().drag_coefficient(&s);
         assert!((f / (2.0 + 0.064 * 8.0) - 1.0).abs() < 1e-5, "{f}");
         let o = DragOptions { sphericity: 0.5, switch_voidage: 0.4, ..DragOptions::default() };

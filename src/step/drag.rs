@@ -114,7 +114,9 @@ impl CouplingStep {
         if s.drag.looks_around() {
             for k in 0..count {
                 let (l, host) = (&b.lanes[k], self.hosts[begin + k] as usize);
-                let around = Around { sauter_diameter: l[0] / l[7], cell_volume: self.mesh.volume[host] };
+                let mean_diameter = if s.drag.wants_mean_diameter() { l[1] / l[0] } else { 0.0 };
+                let cell_volume = self.mesh.volume[host];
+                let around = Around { sauter_diameter: l[0] / l[7], mean_diameter, cell_volume };
                 b.drag[k] = s.drag.drag_coefficient_in(&b.slips[k], &around);
             }
         } else {

@@ -94,8 +94,33 @@ impl CouplingStep {
         self.facts.solid_volume_error = ratio((sum - volume).abs(), volume);
         let gap = [0, 1, 2].map(|a| flux[a] - momentum[a]);
         self.facts.solid_momentum_error = ratio(norm(gap), scale);
+        let negative = found.iter().any(|f| f.2);
+        if self.setup.drag.wants_mean_diameter() && !negative {
+            self.mean_diameters(p);
+        }
         self.seconds.solids = begin.elapsed().as_secs_f64();
-        !found.iter().any(|f| f.2)
+        !negative
+    }
+
+    /// Σ V d of the primary particles, smoothed, for the particles to read in lane 1: the flux there has been taken by now.
+    fn mean_diameters(&mut self, p: &Particles) {
+        let mut lanes = vec![[0.0; 8]; self.classes.rows()];
+        let (mesh, extra) = (self.wide.as_ref().unwrap_or(&self.mesh), &self.setup.extra);
+        self.weights.deposit(mesh, &self.order, &mut lanes, |i, _: &mut ()| {
+            let (v, d) = (p.volume(i), 2.0 * p.radius[i] / extra.ratio(&p.asked.kind, i));
+            [v, v * d, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        });
+        self.smoothers[self.smoother].apply(&mut lanes, &self.active, Direction::Spread, &mut self.scratch);
+        let mut cells = vec![[0.0; 2]; self.mesh.len()];
+        for row in &self.active.rows {
+            let (to, l) = (&mut cells[self.classes.cell(*row)], &lanes[*row as usize]);
+            (to[0], to[1]) = (to[0] + l[0], to[1] + l[1]);
+        }
+        for row in &self.active.rows {
+            let ([now, sum], work) = (cells[self.classes.cell(*row)], &mut self.work[*row as usize]);
+            // lane 0 may be the mean in time
+            work[1] = if now > 0.0 { sum * work[0] / now } else { sum };
+        }
     }
 
     /// The run stops where no fluid is left, unless capping was chosen.

@@ -94,7 +94,10 @@ impl DragLaw for BeetstraFiltered {
         true
     }
     fn drag_coefficient(&self, s: &Slip) -> f64 {
-        self.drag_coefficient_in(s, &Around { sauter_diameter: s.diameter, cell_volume: 0.0 })
+        self.drag_coefficient_in(
+            s,
+            &Around { sauter_diameter: s.diameter, mean_diameter: 0.0, cell_volume: 0.0 },
+        )
     }
     fn drag_coefficient_in(&self, s: &Slip, a: &Around) -> f64 {
         let re = s.voidage * s.reynolds() + SMALL;
@@ -127,7 +130,7 @@ mod tests {
         let slip =
             Slip { diameter: 75e-6, voidage: 0.8, speed: 0.2, kinematic_viscosity: 1.4e-5, density: 1.3 };
         let k = |h: f64| {
-            let around = Around { sauter_diameter: 75e-6, cell_volume: h * h * h };
+            let around = Around { sauter_diameter: 75e-6, mean_diameter: 0.0, cell_volume: h * h * h };
             law.drag_coefficient_in(&slip, &around) / law.drag_coefficient(&slip)
         };
         assert!(k(1e-7) > 0.999 && k(0.01) < 0.6 && k(0.1) < k(0.01), "{} {} {}", k(1e-7), k(0.01), k(0.1));

@@ -4,12 +4,14 @@
 //! Reads one `Slip` (SI units), some also `Around`; writes K (kg/s), type A. Where another code differs from the
 //! publication, the law follows the publication and a variant named after that code follows the code.
 
+mod cello;
 mod factor;
 mod filtered;
 mod gidaspow;
 mod power;
 mod single;
 
+pub use cello::Cello;
 pub use factor::{Beetstra, BeetstraPoly, KochHill, Tang, Tenneti};
 pub use filtered::BeetstraFiltered;
 pub use gidaspow::{Blended, Ergun, Gidaspow, WenYu};
@@ -97,6 +99,7 @@ pub fn all() -> &'static [&'static dyn DragLaw] {
         &Tenneti { nga2: false },
         &Tenneti { nga2: true },
         &Tang,
+        &Cello,
         &SyamlalOBrien,
         &NoCorrection,
         &NoDrag,
