@@ -17,7 +17,7 @@ use crate::monitor::{self, Monitor};
 use crate::output::restart::{Sets, State};
 use crate::partners::Partners;
 use crate::record::{Recorded, Recorder};
-use crate::{setup, threads};
+use crate::{map, setup, threads};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -225,10 +225,20 @@ fn exchange(
     }
     let mesh = receive_mesh(partners).map_err(|e| e.to_string())?;
     println!("mesh: {} cells of {} ranks", mesh.len(), session.cfd_ranks);
+    let begin = Instant::now();
     let step = setup::step(config, mesh)?;
+    let (mapping, links) =
+        (map::resolve(&config.file.map.method, &step.mesh), setup::links(config, &step.mesh));
+    println!("mapping: {} ({mapping})", config.file.map.method);
     let (asked, s) = (&config.file.smooth.method, step.smoother());
-    println!("smoothing: {asked} ({}), {} sweeps", s.name(), s.degree());
-    let along_faces = s.degree() > 0 && config.file.smooth.links == "faces";
+    let along = if links == "voronoi" { " along the Voronoi diagram of the centres" } else { "" };
+    println!(
+        "smoothing: {asked} ({}), {} sweeps{along}; prepared in {:.1} s",
+        s.name(),
+        s.degree(),
+        begin.elapsed().as_secs_f64()
+    );
+    let along_faces = s.degree() > 0 && links == "faces";
     let angle = if along_faces { step.mesh.non_orthogonality() } else { 0.0 };
     if angle > SKEW {
         println!(

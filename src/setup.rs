@@ -80,14 +80,12 @@ pub fn setup(c: &Config) -> Result<Setup, String> {
 
 /// Threads for the stages; none if one is enough.
 pub fn pool(c: &Config) -> Result<Option<rayon::ThreadPool>, String> {
-    let n = c.file.run.threads as usize;
-    let pool = || rayon::ThreadPoolBuilder::new().num_threads(n).build();
-    (n > 1).then(pool).transpose().map_err(|e| format!("run.threads = {n}: {e}"))
+    threads::pool(c.file.run.threads as usize)
 }
 
 /// The mapping by name, ready for the mesh.
 pub fn mapping(c: &Config, mesh: &Mesh) -> Result<Box<dyn Mapping>, String> {
-    let name = &c.file.map.method;
+    let name = map::resolve(&c.file.map.method, mesh);
     let found = map::all().into_iter().find(|m| m.name() == name);
     let mut mapping = found.ok_or_else(|| format!("map.method = \"{name}\" is not known"))?;
     mapping.prepare(mesh, &map::Options { bandwidth: c.file.smooth.bandwidth, grid: c.file.map.grid });
@@ -101,8 +99,17 @@ pub fn classes(c: &Config, mesh: &Mesh) -> Classes {
 
 /// The mesh with the links that smoothing goes along.
 pub fn linked<'a>(c: &Config, mesh: &'a Mesh) -> Cow<'a, Mesh> {
-    let voronoi = c.file.smooth.links == "voronoi" && smooths(c);
+    let voronoi = links(c, mesh) == "voronoi" && smooths(c);
     if voronoi { Cow::Owned(mesh.with_voronoi_links()) } else { Cow::Borrowed(mesh) }
+}
+
+/// The links meant by `smooth.links`: `auto` is `voronoi` on tetrahedra, whose faces are oblique to the lines between centres.
+pub fn links<'a>(c: &'a Config, mesh: &Mesh) -> &'a str {
+    match c.file.smooth.links.as_str() {
+        "auto" if mesh.tetrahedral() => "voronoi",
+        "auto" => "faces",
+        name => name,
+    }
 }
 
 /// Something is smoothed.
@@ -138,7 +145,9 @@ pub fn smoothers(
 /// The coupling step of a case on a mesh.
 pub fn step(c: &Config, mesh: Mesh) -> Result<CouplingStep, String> {
     let mapping = mapping(c, &mesh)?;
-    let (linked, variance) = threads::within(pool(c)?.as_ref(), || {
+    // the partners are silent meanwhile, whatever run.threads says
+    let all = std::thread::available_parallelism().map_or(1, usize::from);
+    let (linked, variance) = threads::within(threads::pool(all)?.as_ref(), || {
         let linked = linked(c, &mesh);
         let variance = if smooths(c) { map::taken_out(&*mapping, &mesh, &linked) } else { None };
         (linked, variance)

@@ -15,6 +15,12 @@ pub fn count() -> usize {
     if rayon::current_thread_index().is_some() { rayon::current_num_threads() } else { 1 }
 }
 
+/// That many threads; none if one is enough.
+pub fn pool(count: usize) -> Result<Option<rayon::ThreadPool>, String> {
+    let pool = || rayon::ThreadPoolBuilder::new().num_threads(count).build();
+    (count > 1).then(pool).transpose().map_err(|e| format!("{count} threads: {e}"))
+}
+
 /// Runs `work` on the threads of the pool, or on the calling thread.
 pub fn within<R: Send>(pool: Option<&rayon::ThreadPool>, work: impl FnOnce() -> R + Send) -> R {
     match pool {

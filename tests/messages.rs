@@ -190,7 +190,7 @@ fn errors() {
             BED,
             &[],
             &["smooth.links=face"],
-            &["smooth.links", "accepted: faces, voronoi", "smooth.links = \"faces\"?"],
+            &["smooth.links", "accepted: auto, faces, voronoi", "smooth.links = \"faces\"?"],
         ),
         (BED, &[], &["smooth.by_diameter=[[2e-3, -1.0]]"], &["smooth.by_diameter = -1", "a bandwidth"]),
         (SETTLING, &[], &["smooth.by_diameter=[[2e-3, 8e-3]]"], &["nothing is smoothed", "\"gaussian\""]),

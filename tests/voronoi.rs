@@ -192,16 +192,26 @@ fn links_do_not_depend_on_pieces_nor_on_threads() {
 }
 
 #[test]
-fn the_case_chooses_its_links() {
+fn the_case_chooses_links_and_mapping() {
     let mesh = Made::tet([6; 3], SIZE).mesh();
-    let of = |links: &str| {
-        let c = common::partners::case(&[("smooth.links", links)], 1);
-        let linked = setup::linked(&c, &mesh);
+    let of = |set: &[(&str, &str)], mesh: &Mesh| {
+        let c = common::partners::case(set, 1);
+        let linked = setup::linked(&c, mesh);
         assert!(setup::step(&c, mesh.clone()).is_ok() && setup::smoothers(&c, &linked, None).is_ok());
-        linked.links.clone()
+        (linked.links.clone(), setup::mapping(&c, mesh).unwrap().name())
     };
-    assert_eq!(of("faces"), mesh.links);
-    assert_eq!(of("voronoi"), mesh.with_voronoi_links().links);
+    let diagram = mesh.with_voronoi_links().links;
+    assert!(
+        of(&[("smooth.links", "faces"), ("map.method", "linear")], &mesh) == (mesh.links.clone(), "linear")
+    );
+    assert!(
+        of(&[("smooth.links", "voronoi"), ("map.method", "linear")], &mesh) == (diagram.clone(), "linear")
+    );
+    assert!(of(&[], &mesh) == (diagram, "max-entropy"));
+    for made in [Made::hex([6; 3], SIZE), Made::poly([5; 3], SIZE)] {
+        let mesh = made.mesh();
+        assert!(of(&[], &mesh) == (mesh.links.clone(), "linear"), "{made:?}");
+    }
 }
 
 /// T of the links that smoothing goes by is b²/4 less half of the deposit's variance, the same in both rows.

@@ -102,7 +102,8 @@ pub fn setup(drag: &str) -> Result<Setup, String> {
 pub fn run(case: &Case) -> Result<Cost, String> {
     let mesh = scene::mesh(scene::BOX, case.cells);
     let fluid = scene::air(&mesh);
-    let mapping = map::all().into_iter().find(|m| m.name() == case.mapping);
+    let name = map::resolve(case.mapping, &mesh);
+    let mapping = map::all().into_iter().find(|m| m.name() == name);
     let mut mapping = mapping.ok_or_else(|| format!("mapping {} is not known", case.mapping))?;
     mapping.prepare(&mesh, &map::Options { bandwidth: case.bandwidth, grid: 2.4 * case.diameter });
     let t = smooth::Diffusion::uniform(case.bandwidth).links(&mesh);

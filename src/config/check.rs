@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! What cannot work, or will surprise: checked across case.toml, the OpenFOAM case and the DEM script.
 
-use super::resolution::{courant, gather_bias, history, relaxation};
+use super::resolution::{courant, gather_bias, history, pressure_gradient, relaxation};
 use super::{
     CoarseGraining, Config, Continuity, Feedback, GravityTreatment, InInterval, Model, Problem, bandwidth,
     foam, script,
@@ -38,7 +38,8 @@ pub fn check(c: &Config) -> Vec<Problem> {
             format!("fluid.kinematic_viscosity = {nu:e}"),
         ));
     }
-    if !case.join("constant/polyMesh/points").exists() && !case.join("system/blockMeshDict").exists() {
+    let mesh = ["points", "points.gz"].iter().any(|f| case.join("constant/polyMesh").join(f).exists());
+    if !mesh && !case.join("system/blockMeshDict").exists() {
         let accepted = "the case has neither constant/polyMesh nor system/blockMeshDict";
         p.push(Problem::error(
             "fluid.case",
@@ -47,6 +48,7 @@ pub fn check(c: &Config) -> Vec<Problem> {
             "make the mesh first, e.g. blockMesh",
         ));
     }
+    pressure_gradient(c, &mut p);
     if let (Some(mesh), Ok(s)) = (foam::extent(&case), &script) {
         meshes(c, &mesh, s, &mut p);
     }

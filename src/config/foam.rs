@@ -94,14 +94,29 @@ pub fn extent(case: &Path) -> Option<Extent> {
     let text = std::fs::read_to_string(folder.join("points")).ok();
     let found =
         text.and_then(|t| bounds(&vectors(&plain(&t)), 1.0, None)).or_else(|| from_block_mesh(case))?;
-    Some(Extent { cells: noted(&folder.join("owner")).or(found.cells), ..found })
+    Some(Extent { cells: noted(case, "nCells").or(found.cells), ..found })
 }
 
-/// What OpenFOAM's tools note in the head of the file: "nPoints:304  nCells:972  nFaces:2178 …".
-fn noted(owner: &Path) -> Option<usize> {
+/// Mean number of faces of a cell, of a mesh in constant/polyMesh: 4 for tetrahedra, 6 for hexahedra.
+pub fn faces_per_cell(case: &Path) -> Option<f64> {
+    let number = |what| noted(case, what).map(|n| n as f64);
+    Some((number("nFaces")? + number("nInternalFaces")?) / number("nCells")?)
+}
+
+/// What OpenFOAM's tools note in the head of constant/polyMesh/owner: "nPoints:304  nCells:972  nFaces:2178  nInternalFaces:1710".
+fn noted(case: &Path, what: &str) -> Option<usize> {
     let mut head = Vec::new();
-    std::fs::File::open(owner).ok()?.take(4096).read_to_end(&mut head).ok()?;
-    String::from_utf8_lossy(&head).split("nCells:").nth(1)?.split_whitespace().next()?.parse().ok()
+    std::fs::File::open(case.join("constant/polyMesh/owner")).ok()?.take(4096).read_to_end(&mut head).ok()?;
+    let (head, what) = (String::from_utf8_lossy(&head), format!("{what}:"));
+    let word = |rest: &str| rest.trim_start().chars().take_while(char::is_ascii_digit).collect::<String>();
+    word(head.split(&what).nth(1)?).parse().ok()
+}
+
+/// The scheme of system/fvSchemes for the gradient of a field: its own, else the default.
+pub fn gradient(case: &Path, field: &str) -> Option<String> {
+    let text = plain(&std::fs::read_to_string(case.join("system/fvSchemes")).ok()?);
+    let section = text.split("gradSchemes").nth(1)?.split(['{', '}']).nth(1)?;
+    entry(section, &format!("grad({field})")).or_else(|| entry(section, "default"))
 }
 
 /// "(x y z)" groups of numbers in a text.
@@ -163,10 +178,19 @@ mod tests {
         // a mesh that is there is what runs, whatever dictionary lies beside it
         std::fs::write(mesh.join("points"), "FoamFile { format ascii; }\n2\n(\n(0 0 0)\n(1 2.5 3)\n)")
             .unwrap();
-        std::fs::write(mesh.join("owner"), "FoamFile { note \"nPoints:2  nCells:972  nFaces:2178\"; }")
-            .unwrap();
+        std::fs::write(
+            mesh.join("owner"),
+            "FoamFile { note \"nPoints:2  nCells:972  nFaces:2178  nInternalFaces:1710\"; }",
+        )
+        .unwrap();
         let found = extent(&folder).unwrap();
         assert_eq!((found.upper, found.cells), ([1.0, 2.5, 3.0], Some(972)));
+        assert_eq!(faces_per_cell(&folder), Some((2178.0 + 1710.0) / 972.0));
+        let schemes =
+            "ddtSchemes { default Euler; } gradSchemes { default Gauss linear; grad(p) leastSquares; }";
+        std::fs::write(folder.join("system/fvSchemes"), schemes).unwrap();
+        assert_eq!(gradient(&folder, "p").as_deref(), Some("leastSquares"));
+        assert_eq!(gradient(&folder, "U").as_deref(), Some("Gauss linear"));
         std::fs::remove_dir_all(&folder).unwrap();
         assert_eq!(vectors("((0 0 0) (1 2.5 3) (a b c)) (4 5)"), [[0.0; 3], [1.0, 2.5, 3.0]]);
     }

@@ -272,8 +272,8 @@ fn smoother() -> String {
 fn tolerance() -> f64 {
     1e-2
 }
-fn faces() -> String {
-    "faces".into()
+fn auto() -> String {
+    "auto".into()
 }
 
 /// Section `smooth`.
@@ -287,7 +287,7 @@ pub struct Smooth {
     pub bandwidth: f64,
     #[serde(default = "tolerance")]
     pub tolerance: f64,
-    #[serde(default = "faces")]
+    #[serde(default = "auto")]
     pub links: String,
     #[serde(default)]
     pub by_diameter: Vec<[f64; 2]>,
@@ -493,7 +493,7 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
         "map.method",
         "",
         map::DEFAULT,
-        "linear | max-entropy (any cells; with smooth.links = voronoi on tetrahedra) | particle-centroid (SX eq. 4; cheapest) | satellite-points (29) | divided-volume (exact overlap) | kernel (Gaussian of \
+        "auto (max-entropy where more than a quarter of the cells are tetrahedra, else linear) | linear | max-entropy (any cells) | particle-centroid (SX eq. 4; cheapest) | satellite-points (29) | divided-volume (exact overlap) | kernel (Gaussian of \
          smooth.bandwidth; with smooth.method = none) | two-grid",
     ),
     ("map.grid", "m", "0", "two-grid: cell size of the coarse grid; 2 to 3 particle diameters"),
@@ -518,9 +518,9 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     (
         "smooth.links",
         "",
-        "faces",
+        "auto",
         "what the smoother's Laplacian joins cells by: faces (of the mesh) | voronoi (of the diagram of the cell centres: exact moments \
-         on tetrahedra)",
+         on tetrahedra) | auto (voronoi where more than a quarter of the cells are tetrahedra, else faces)",
     ),
     (
         "smooth.by_diameter",
@@ -743,9 +743,10 @@ fn names(file: &CaseFile) -> Vec<Problem> {
     check("forces.lift", &file.forces.lift, lifts.collect());
     check("coupling.scheme", &file.coupling.scheme, scheme::all().iter().map(|s| s.name()).collect());
     check("coupling.void_velocity", &file.coupling.void_velocity, vec!["kernel", "pinned"]);
-    check("map.method", &file.map.method, map::all().iter().map(|m| m.name()).collect());
+    let methods = [map::DEFAULT].into_iter().chain(map::all().iter().map(|m| m.name())).collect();
+    check("map.method", &file.map.method, methods);
     check("smooth.method", &file.smooth.method, smooth::NAMES.to_vec());
-    check("smooth.links", &file.smooth.links, vec!["faces", "voronoi"]);
+    check("smooth.links", &file.smooth.links, vec!["auto", "faces", "voronoi"]);
     check("interpolate.fluid_velocity", &file.interpolate.fluid_velocity, FluidVelocity::NAMES.to_vec());
     check("limits.outside", &file.limits.outside, vec!["error", "exclude"]);
     check("output.picture", &file.output.picture, vec!["none", "x", "y", "z"]);

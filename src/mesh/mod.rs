@@ -126,6 +126,10 @@ impl Mesh {
     pub fn is_empty(&self) -> bool {
         self.ids.is_empty()
     }
+    /// More than a quarter of the cells are tetrahedra.
+    pub fn tetrahedral(&self) -> bool {
+        4 * (0..self.len()).filter(|i| self.sides(*i).len() == 4).count() > self.len()
+    }
     /// Sides of a cell.
     pub fn sides(&self, slot: usize) -> &[Side] {
         &self.sides[self.side_start[slot] as usize..self.side_start[slot + 1] as usize]

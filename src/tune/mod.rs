@@ -87,7 +87,7 @@ pub fn tune<R: Read + Seek + 'static>(
     let mut search = Search {
         bench: Bench::new(open, ask.base, ask.exchanges)?,
         exact: scene.gaussian(&config),
-        case: Settings::of(&config),
+        case: Settings::of(&config, &scene.mesh),
         config,
         scene,
         points: Vec::new(),

@@ -8,6 +8,7 @@
 use crate::config::{Config, Interpolate, Map, Smooth};
 use crate::interpolate::FluidVelocity;
 use crate::map;
+use crate::mesh::Mesh;
 use crate::mesh::made::Made;
 use crate::smooth::{self, Diffusion, Smoother};
 use serde::Serialize;
@@ -33,11 +34,11 @@ const EXACT: (&str, f64) = ("chebyshev", 1e-13);
 const TIGHTEST: f64 = 1e-12;
 
 impl Settings {
-    /// Of a case.
-    pub fn of(c: &Config) -> Self {
+    /// Of a case on its mesh.
+    pub fn of(c: &Config, mesh: &Mesh) -> Self {
         let f = &c.file;
         Self {
-            mapping: f.map.method.clone(),
+            mapping: map::resolve(&f.map.method, mesh).into(),
             grid: f.map.grid,
             interpolation: f.interpolate.fluid_velocity.clone(),
             smoother: f.smooth.method.clone(),
