@@ -522,6 +522,7 @@ fn solid_fraction(
     let mut position = position.to_vec();
     let mut host = vec![NONE; position.len()];
     Locator::new(mesh).locate(mesh, &mut position, &mut host).unwrap();
+    let mapping = map::resolve(mapping, mesh);
     let mut m = map::all().into_iter().find(|m| m.name() == mapping).unwrap();
     m.prepare(mesh, &Options { bandwidth: b, grid: 1.0 });
     let mut w = Weights::default();
