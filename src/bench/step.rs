@@ -115,7 +115,7 @@ pub fn run(case: &Case) -> Result<Cost, String> {
     let mut p = scene::bed(scene::BOX, case.particles, case.diameter);
     let mut seed = 7;
     let mut cost = Cost {
-        mapping: case.mapping,
+        mapping: name,
         particles: p.len(),
         cells,
         bandwidth: case.bandwidth,

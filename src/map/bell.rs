@@ -6,7 +6,7 @@
 //! in the bell local sizes.
 
 use super::exp::exp;
-use crate::mesh::geometry::{V, cross, dot, length, scale, sub};
+use crate::mesh::geometry::{V, dot, length, scale, solve, sub};
 use crate::smooth::Real;
 use pulp::{Simd, WithSimd};
 
@@ -288,8 +288,6 @@ impl Moments {
             [m[3] - g[0] * g[1], m[1] - g[1] * g[1] + 1e-12, m[4] - g[1] * g[2]],
             [m[5] - g[0] * g[2], m[4] - g[1] * g[2], m[2] - g[2] * g[2] + 1e-12],
         ];
-        let inverse = [cross(s[1], s[2]), cross(s[2], s[0]), cross(s[0], s[1])];
-        let det = dot(s[0], inverse[0]);
-        [0, 1, 2].map(|a| (0..3).map(|b| inverse[b][a] * g[b]).sum::<f64>() / det)
+        solve(&s, g)
     }
 }

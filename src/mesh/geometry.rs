@@ -24,6 +24,13 @@ pub fn cross(a: V, b: V) -> V {
 pub fn length(a: V) -> f64 {
     dot(a, a).sqrt()
 }
+/// x of m x = b by Cramer's rule; `m` by rows, not singular.
+#[inline(always)]
+pub fn solve(m: &[V; 3], b: V) -> V {
+    let inverse = [cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])];
+    let det = dot(m[0], inverse[0]);
+    [0, 1, 2].map(|i| (0..3).map(|k| inverse[k][i] * b[k]).sum::<f64>() / det)
+}
 
 fn less(a: &V, b: &V) -> bool {
     a.partial_cmp(b) == Some(std::cmp::Ordering::Less)

@@ -3,7 +3,7 @@
 
 use super::super::Weights;
 use super::super::cells::{Cells, Facet};
-use crate::mesh::geometry::{V, add, cross, dot, length, scale, sub};
+use crate::mesh::geometry::{V, add, cross, dot, length, scale, solve, sub};
 use crate::mesh::{Mesh, NONE};
 
 /// Symmetric 3×3 (m2).
@@ -270,9 +270,7 @@ fn entropy(d: &[V]) -> Vec<f64> {
         d.iter().zip(&w).for_each(|(x, w)| plus(&mut h, &outer(scale(*x, 1.0 / s)), *w));
         plus(&mut h, &outer(g), -1.0);
         (0..3).for_each(|a| h[a][a] += 1e-10);
-        let det = dot(h[0], cross(h[1], h[2]));
-        let solve = [cross(h[1], h[2]), cross(h[2], h[0]), cross(h[0], h[1])];
-        let step: V = [0, 1, 2].map(|a| (0..3).map(|b| solve[b][a] * g[b]).sum::<f64>() / det);
+        let step = solve(&h, g);
         let mut t = 1.0;
         loop {
             let next = sub(lambda, scale(step, t));
