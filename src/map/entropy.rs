@@ -50,7 +50,7 @@ const PIECE: usize = 4096;
 pub struct MaxEntropy {
     sizes: Sizes,
     /// by host: the cells around it, found when it first has a particle
-    rings: Vec<OnceLock<Ring>>,
+    rings: Vec<OnceLock<Box<Ring>>>,
 }
 
 /// What one thread keeps.
@@ -77,7 +77,7 @@ impl MaxEntropy {
             if table.host != Some(host) {
                 let mut find = || Ring::find(mesh, sizes, host, width * END.sqrt(), around);
                 if keep && k == 0 {
-                    let ring = self.rings[host as usize].get_or_init(find);
+                    let ring = self.rings[host as usize].get_or_init(|| Box::new(find()));
                     table.set(width, host, ring.seen(sizes));
                 } else {
                     table.set(width, host, find().seen(sizes));
