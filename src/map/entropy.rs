@@ -138,11 +138,14 @@ impl Mapping for MaxEntropy {
     }
     fn cell_variance(&self, mesh: &Mesh) -> Vec<f64> {
         let cells = Cells::new(mesh);
-        let parts = threads::map(threads::pieces(mesh.len(), PIECE), |range| {
+        let order = mesh.along_curve();
+        let parts = threads::map(order.chunks(PIECE).collect(), |part| {
             let mut s = Scratch::default();
-            range.map(|c| self.variance(mesh, &cells, c as u32, &mut s)).collect::<Vec<f64>>()
+            part.iter().map(|c| self.variance(mesh, &cells, *c, &mut s)).collect::<Vec<f64>>()
         });
-        parts.concat()
+        let mut all = vec![0.0; mesh.len()];
+        order.iter().zip(parts.concat()).for_each(|(c, v)| all[*c as usize] = v);
+        all
     }
     fn weights(&self, mesh: &Mesh, position: &[[f64; 3]], _: &[f64], host: &[u32], out: &mut Weights) {
         assert_eq!(self.rings.len(), mesh.len(), "max-entropy: prepare() it for this mesh first");

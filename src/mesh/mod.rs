@@ -130,6 +130,19 @@ impl Mesh {
     pub fn tetrahedral(&self) -> bool {
         4 * (0..self.len()).filter(|i| self.sides(*i).len() == 4).count() > self.len()
     }
+    /// Cells along a curve through their centres (Morton's): those that follow each other are near each other, however the mesh is numbered.
+    pub fn along_curve(&self) -> Vec<u32> {
+        let [low, high] = self.bounds;
+        let place = |x: f64, a: usize| ((x - low[a]) / (high[a] - low[a]) * 1024.0).clamp(0.0, 1023.0) as u32;
+        // ten bits of each axis in turn
+        let key = |c: &[f64; 3]| {
+            let p = [0, 1, 2].map(|a| place(c[a], a));
+            (0..30).rev().fold(0u32, |key, b| key << 1 | p[b % 3] >> (b / 3) & 1)
+        };
+        let mut all: Vec<(u32, u32)> = self.centre.iter().map(key).zip(0..).collect();
+        all.sort_unstable();
+        all.into_iter().map(|e| e.1).collect()
+    }
     /// Sides of a cell.
     pub fn sides(&self, slot: usize) -> &[Side] {
         &self.sides[self.side_start[slot] as usize..self.side_start[slot + 1] as usize]

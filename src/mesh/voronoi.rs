@@ -211,6 +211,7 @@ fn links(mesh: &Mesh) -> (Vec<u32>, Vec<Link>) {
     let n = mesh.len();
     let extent = mesh.extents();
     let piece = n.div_ceil(PIECES).max(PIECE);
+    let order = mesh.along_curve();
     // rows as each cell sees them
     let parts = threads::map(threads::pieces(n, piece), |range| {
         let mut walk = Walk {
@@ -223,18 +224,24 @@ fn links(mesh: &Mesh) -> (Vec<u32>, Vec<Link>) {
             walls: Vec::new(),
         };
         let (mut ends, mut all, mut row) = (Vec::new(), Vec::new(), Vec::new());
-        for c in range {
-            walk.row(c, &mut row);
+        for c in &order[range] {
+            walk.row(*c as usize, &mut row);
             all.extend_from_slice(&row);
             ends.push(all.len());
         }
         (ends, all)
     });
-    let (mut start, mut seen): (Vec<usize>, Vec<(u32, f64)>) = (vec![0], Vec::new());
-    for (ends, all) in parts {
-        let from = seen.len();
-        seen.extend(all);
-        start.extend(ends.into_iter().map(|e| e + from));
-    }
-    both(mesh, &start, &seen)
+    // by cell
+    let mut found: Vec<&[(u32, f64)]> = vec![&[]; n];
+    let rows = parts.iter().flat_map(|(ends, all)| {
+        let begins = std::iter::once(&0).chain(ends);
+        begins.zip(ends).map(|(b, e)| &all[*b..*e])
+    });
+    order.iter().zip(rows).for_each(|(c, row)| found[*c as usize] = row);
+    let mut start = vec![0];
+    start.extend(found.iter().scan(0, |end, row| {
+        *end += row.len();
+        Some(*end)
+    }));
+    both(mesh, &start, &found.concat())
 }
