@@ -65,15 +65,19 @@ impl Locator {
         let near = self
             .near
             .get_or_init(|| Lists::new(mesh, &self.bins, if self.planar { 1e-6 } else { 5.0 * GAP }));
-        let mut best: Option<(f64, u32)> = None;
-        for cell in near.of(self.bins.of(x)) {
-            if let Some(worst) = violated(mesh, *cell as usize, &x, self.planar)
-                && best.is_none_or(|b| worst < b.0)
-            {
-                best = Some((worst, *cell));
+        let best = |strict| {
+            let mut best: Option<(f64, u32)> = None;
+            for cell in near.of(self.bins.of(x)) {
+                if let Some(worst) = violated(mesh, *cell as usize, &x, self.planar, strict)
+                    && best.is_none_or(|b| worst < b.0)
+                {
+                    best = Some((worst, *cell));
+                }
             }
-        }
-        best.map(|b| b.1)
+            best.map(|b| b.1)
+        };
+        // on an edge each of its faces may send the point on, by rounding
+        best(self.planar).or_else(|| best(false))
     }
 
     /// Finds all host cells. `host`: in: guesses or `NONE`; out: slots. Errors list every lost particle.
@@ -177,15 +181,15 @@ impl Locator {
 /// Largest gap or overlap between cells of a warped mesh that a point may lie in, relative to the cell size.
 pub(crate) const GAP: f64 = 0.1;
 
-/// How far `x` lies beyond the worst side of a cell (0: inside); none: not in it.
-fn violated(mesh: &Mesh, cell: usize, x: &[f64; 3], planar: bool) -> Option<f64> {
+/// How far `x` lies beyond the worst side of a cell (0: inside); none: not in it. `strict`: nor if it belongs across a side.
+fn violated(mesh: &Mesh, cell: usize, x: &[f64; 3], planar: bool, strict: bool) -> Option<f64> {
     let size = mesh.volume[cell].cbrt();
     let allowed = if planar { BOUNDARY * size } else { GAP * size };
     let mut worst = 0.0f64;
     for side in mesh.sides(cell) {
         let (distance, leaves) = beyond(mesh, side, x);
         let limit = if side.across == NONE { BOUNDARY * size } else { allowed };
-        if distance > limit || (planar && leaves) {
+        if distance > limit || (strict && leaves) {
             return None;
         }
         worst = worst.max(if side.across == NONE { 0.0 } else { distance });
@@ -224,13 +228,32 @@ mod tests {
             let (mut seed, mut outside) = (3, 0);
             for _ in 0..4000 {
                 let x = size.map(|s| s * (1.2 * crate::bench::scene::random(&mut seed) - 0.1));
-                let all =
-                    (0..mesh.len()).filter_map(|c| Some((violated(&mesh, c, &x, locator.planar)?, c as u32)));
+                let all = (0..mesh.len()).filter_map(|c| {
+                    Some((violated(&mesh, c, &x, locator.planar, locator.planar)?, c as u32))
+                });
                 let best = all.min_by(|a, b| a.0.total_cmp(&b.0));
                 assert_eq!(locator.search(&mesh, x), best.map(|b| b.1), "{made:?} {x:?}");
                 outside += usize::from(best.is_none());
             }
             assert!((500..3500).contains(&outside), "{outside}");
+        }
+    }
+
+    /// Edges and corners belong to a cell, whatever the rounding of the faces that meet there.
+    #[test]
+    fn points_on_edges_are_in_a_cell() {
+        for made in [
+            Made::hex([10, 10, 10], [0.1; 3]),
+            Made::graded([9, 8, 7], [0.06, 0.04, 0.05]),
+            Made::tet([4, 3, 4], [0.06, 0.04, 0.05]).cyclic([true, false, false]),
+            Made::poly([4, 3, 3], [0.06, 0.04, 0.05]),
+        ] {
+            let mesh = made.mesh();
+            let locator = Locator::new(&mesh);
+            let mut x = mesh.faces.points.clone();
+            let mut host = vec![NONE; x.len()];
+            let lost = locator.locate(&mesh, &mut x, &mut host);
+            assert_eq!(lost, Ok(()), "{made:?}");
         }
     }
 }
