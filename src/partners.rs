@@ -283,7 +283,14 @@ impl<T: Transport> Partners<T> {
             fill(&mut loan);
             transport.send(loan)
         };
-        work().map_err(|source| PartnerError::Transport { who, source })
+        let Err(source) = work() else { return Ok(()) };
+        // who takes nothing any more may have said why
+        let last = transport.receive(Duration::ZERO).ok().flatten();
+        let words = last.as_ref().and_then(|s| Frame::parse(s).ok()).filter(|f| f.kind() == kind::FAIL);
+        Err(match words {
+            Some(f) => PartnerError::GaveUp { who, reason: f.text() },
+            None => PartnerError::Transport { who, source },
+        })
     }
 
     /// The fluid has sent its last: its ranks may end, nobody waits for them.
@@ -347,6 +354,11 @@ mod tests {
         let (mut p, mut a, _b) = run(own, own);
         send_copy(&mut a, &frame::text_frame(kind::FAIL, 0, b"out of atoms")).unwrap();
         assert_eq!(error(&mut p, 1), "DEM rank 0 gave up: out of atoms");
+        let (mut p, _a, mut b) = run(own, own);
+        send_copy(&mut b, &frame::text_frame(kind::FAIL, 0, b"no sources")).unwrap();
+        drop(b);
+        let e = p.send(1, kind::SOURCES, 1, 0.0, &[], |_| {}).unwrap_err().to_string();
+        assert_eq!(e, "CFD rank 0 gave up: no sources");
         let (mut p, _a, mut b) = run(own, own);
         send_copy(&mut b, &frame::text_frame(kind::MESH, 0, b"")).unwrap();
         assert!(error(&mut p, 1).contains("kind 20 arrived where 21 was due"));

@@ -145,11 +145,19 @@ impl Groups {
         // not always UTF-8: LIGGGHTS may print freed memory behind its last message
         let read = |l| String::from_utf8_lossy(&std::fs::read(l).unwrap_or_default()).into_owned();
         let tail: String = logs.map(read).collect();
+        // "voidage: ", not the "voidage::" of a function's name
         let wanted = |l: &&str| {
-            (l.contains("ERROR") || l.contains("rror:") || l.contains("voidage:")) && !l.contains("ORTE_")
+            (l.contains("ERROR") || l.contains("rror:") || l.contains("voidage: ")) && !l.contains("ORTE_")
         };
-        if let Some(line) = tail.lines().rev().find(wanted).filter(|l| !text.contains(l.trim())) {
-            text += &format!("\n  {} {how}; its log says: {}", g.name, line.trim());
+        let lines: Vec<&str> = tail.lines().collect();
+        if let Some(at) = lines.iter().rposition(wanted) {
+            let line = lines[at].trim();
+            // OpenFOAM says what it is in the line after
+            let more = lines.get(at + 1).filter(|_| line.ends_with("ERROR:"));
+            if !text.contains(line) {
+                text += &format!("\n  {} {how}; its log says: {line}", g.name);
+                text.extend(more.map(|l| format!(" {}", l.trim())));
+            }
         }
         text + &format!("\n  log: {}", g.log.display())
     }
