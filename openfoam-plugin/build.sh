@@ -22,8 +22,9 @@ stale() {
 mkdir -p "$prefix/lib" "$prefix/bin"
 lib=$prefix/lib/libvoidageFoam.so
 if stale "$lib" "$here"/*.H "$here"/link.C "$here"/mesh.C "$here"/stockSolvers.C "$abi/voidage.h"; then
+  # soname: `libs ("libvoidageFoam.so")` of a controlDict finds the one `voidage run` has preloaded
   g++ $flags -shared -o "$lib.part" "$here/link.C" "$here/mesh.C" "$here/stockSolvers.C" $libs \
-    -L"$prefix/lib" -lvoidage_client '-Wl,-rpath,$ORIGIN'
+    -L"$prefix/lib" -lvoidage_client '-Wl,-soname,libvoidageFoam.so' '-Wl,-rpath,$ORIGIN'
   mv "$lib.part" "$lib"
 fi
 bin=$prefix/bin/voidageFoam

@@ -24,6 +24,12 @@ void Link::fail() const
     FatalErrorInFunction << "voidage: " << voidage_last_error() << exit(FatalError);
 }
 
+void Link::giveUp(const std::string& why) const
+{
+    voidage_fail(link_, why.c_str());
+    FatalErrorInFunction << "voidage: " << why.c_str() << exit(FatalError);
+}
+
 Link::Link(const fvMesh& mesh)
 :
     link_(nullptr),

@@ -3,8 +3,9 @@
 // each step, and an fvOption `voidageSource` that puts (Su - Sp U)/rho into the momentum equation.
 //
 // The solver knows no voidage: model B only (no pressure-gradient force, which needs the solver's own share).
-// controlDict: functions { voidage { type voidage; libs ("libvoidageFoam.so"); } }
+// controlDict: functions { voidage { type voidage; } }; for --restart startFrom latestTime
 // fvOptions:   voidage { type voidageSource; voidageSourceCoeffs { fields (U); } }
+// `voidage run` preloads this library: solvers make their fvOptions before they load those of function objects.
 #include "addToRunTimeSelectionTable.H"
 #include "fvMatrices.H"
 #include "fvMeshFunctionObject.H"
@@ -59,9 +60,11 @@ static voidage::Link& started(const fvMesh& mesh)
     {
         if (link.setting("fluid.model") == 1 || link.on("send.stress_divergence"))
         {
-            FatalErrorInFunction
-                << "voidage: coupling.model = \"A\" needs a solver that knows the voidage; type: coupling.model = \"B\" "
-                << "and forces.viscous_stress = false, or fluid.solver = \"voidageFoam\"" << exit(FatalError);
+            link.giveUp
+            (
+                "coupling.model = \"A\" needs a solver that knows the voidage; type: coupling.model = \"B\" "
+                "and forces.viscous_stress = false, or fluid.solver = \"voidageFoam\""
+            );
         }
         sendState(mesh, false);
         link.receive();
@@ -90,6 +93,14 @@ public:
         const label done = time_.timeIndex() - time_.startTimeIndex();
         if (done > 0 && link.exchange() - link.first() < done)
         {
+            if (link.received() == link.exchange())
+            {
+                link.giveUp
+                (
+                    "the solver took no sources in this step: constant/fvOptions needs voidage { type voidageSource; "
+                    "voidageSourceCoeffs { fields (U); } }, and a solver that reads fvOptions (icoFoam does not)"
+                );
+            }
             sendState(mesh_, true);
         }
         return true;
@@ -130,6 +141,14 @@ public:
         if (received_ != mesh_.time().timeIndex())
         {
             received_ = mesh_.time().timeIndex();
+            if (link.received() > link.exchange())
+            {
+                link.giveUp
+                (
+                    "the step before was not sent: system/controlDict needs functions { voidage { type voidage; } }, "
+                    "executed after each step"
+                );
+            }
             link.receive();
         }
         const voidage::Sources& q = link.sources();

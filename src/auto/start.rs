@@ -148,7 +148,7 @@ impl Choosing<'_> {
     /// both and the solid fraction are negligible, B is the same with two fields less.
     fn model(&mut self) {
         let terms = ["pressure gradient", "viscous stress"];
-        let stock = self.c.file.fluid.solver != "voidageFoam";
+        let stock = self.c.file.fluid.stock();
         let small = terms.iter().all(|t| self.negligible(self.magnitude(t).0))
             && self.scene.solid_fraction.is_some_and(|p| self.negligible(p));
         let (kept, f) = (self.kept(MODEL), &mut self.c.file);

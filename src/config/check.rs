@@ -3,8 +3,8 @@
 
 use super::resolution::{courant, gather_bias, history, pressure_gradient, relaxation};
 use super::{
-    CoarseGraining, Config, Continuity, Feedback, GravityTreatment, InInterval, Model, Problem, bandwidth,
-    foam, script,
+    CoarseGraining, Config, Continuity, Feedback, Flow, GravityTreatment, InInterval, Model, Problem,
+    bandwidth, foam, script,
 };
 
 /// All problems of a case, errors first.
@@ -213,7 +213,7 @@ fn smoothing(c: &Config, p: &mut Vec<Problem>) {
 
 fn models(c: &Config, p: &mut Vec<Problem>) {
     let f = &c.file;
-    let stock = f.fluid.solver != "voidageFoam";
+    let stock = f.fluid.stock();
     let two_way = f.coupling.feedback == Feedback::TwoWay;
     if f.coupling.model == Model::A && two_way && !(f.forces.pressure_gradient && f.forces.viscous_stress) {
         let accepted = "model A gives the particles their share of grad p and div tau; without it action is not reaction";
@@ -233,6 +233,16 @@ fn models(c: &Config, p: &mut Vec<Problem>) {
             "a stock solver knows no voidage: model B only",
             fix,
         ));
+    }
+    if stock && f.fluid.flow == Flow::Frozen {
+        let accepted = "a stock solver always solves its flow";
+        p.push(Problem::error("fluid.flow", "frozen", accepted, "fluid.solver = \"voidageFoam\""));
+    }
+    if stock && f.fluid.mean_pressure_gradient != [0.0; 3] {
+        let given = format!("{:?}", f.fluid.mean_pressure_gradient);
+        let accepted = "only voidageFoam applies it";
+        let fix = "leave it out and drive the flow in constant/fvOptions (meanVelocityForce)";
+        p.push(Problem::error("fluid.mean_pressure_gradient", given, accepted, fix));
     }
     let moving = f.fluid.gravity.iter().any(|g| *g != 0.0);
     if f.fluid.gravity_treatment == GravityTreatment::InPressure && !moving {

@@ -101,6 +101,12 @@ pub struct Fluid {
     #[serde(default = "solved")]
     pub flow: Flow,
 }
+impl Fluid {
+    /// A solver of OpenFOAM's own.
+    pub fn stock(&self) -> bool {
+        self.solver != voidage_foam()
+    }
+}
 
 /// How the force acts within an interval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

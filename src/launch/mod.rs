@@ -37,6 +37,8 @@ pub struct Companions {
     pub voidage: PathBuf,
     /// the solver
     pub solver: PathBuf,
+    /// function object and fvOption for stock solvers
+    pub stock: PathBuf,
     /// the LIGGGHTS fix
     pub fix: PathBuf,
 }
@@ -56,6 +58,7 @@ pub fn companions() -> Result<Companions, String> {
     Ok(Companions {
         voidage: exe,
         solver: home.join("bin/voidageFoam"),
+        stock: home.join("lib/libvoidageFoam.so"),
         fix: home.join("lib/libvoidageLiggghts.so"),
     })
 }
@@ -148,10 +151,14 @@ fn start(
     let file = from.map_or_else(|| "none".into(), |r| text(&r.particles()));
     dem.extend(["-var", "voidage_restart", if from.is_some() { "1" } else { "0" }].map(String::from));
     dem.extend(["-var".into(), "voidage_restart_file".into(), file]);
-    let mut cfd = mpirun(f.run.cfd_ranks, &shared, &own("mf")?, &[&session, &foam]);
-    let solver = if f.fluid.solver == "voidageFoam" { text(&home.solver) } else { f.fluid.solver.clone() };
+    let stock = f.fluid.stock();
+    // a stock solver selects its fvOptions before it loads the libraries of its function objects
+    let library = format!("LD_PRELOAD={}", home.stock.display());
+    let export: &[&str] = if stock { &[&session, &foam, &library] } else { &[&session, &foam] };
+    let mut cfd = mpirun(f.run.cfd_ranks, &shared, &own("mf")?, export);
+    let solver = if stock { f.fluid.solver.clone() } else { text(&home.solver) };
     cfd.extend([solver, "-case".into(), text(&config.fluid_case())]);
-    if let Some(r) = from.filter(|_| f.fluid.solver == "voidageFoam") {
+    if let Some(r) = from.filter(|_| !stock) {
         cfd.extend(["-restartTime".to_string(), r.state.time.to_string()]);
     }
     if f.run.cfd_ranks > 1 {
