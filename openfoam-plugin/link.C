@@ -40,9 +40,10 @@ Link::Link(const fvMesh& mesh)
 {
     const Time& time = mesh.time();
     const scalar dt = time.deltaTValue();
+    // the start of the run: in a stock solver the link is opened within the first step
     link_ = voidage_open
     (
-        VOIDAGE_CFD, Pstream::myProcNo(), Pstream::nProcs(), dt, time.timeIndex(), time.value(),
+        VOIDAGE_CFD, Pstream::myProcNo(), Pstream::nProcs(), dt, time.startTimeIndex(), time.startTime().value(),
         ("OpenFOAM " + std::to_string(OPENFOAM)).c_str()
     );
     if (!link_) fail();

@@ -225,8 +225,8 @@ pub fn agree<T: Transport>(c: &Config, partners: &Partners<T>, resume: Option<&S
         if !dem && (h.time - s.time).abs() > 0.01 * c.period() {
             return Err(format!(
                 "{} starts at t = {} s, the restart set is of t = {} s: a stock solver needs, in controlDict, \
-                 startFrom latestTime; and the newest set",
-                h.program, h.time, s.time
+                 startFrom startTime; startTime {};",
+                h.program, h.time, s.time, s.time
             ));
         }
     }

@@ -51,11 +51,14 @@ impl Case {
         let out = self.try_run(more);
         assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     }
-    fn refused(&self, more: &[&str], code: i32, says: &[&str]) {
-        let out = self.try_run(&[&["--restart"], more].concat());
+    fn fails(&self, more: &[&str], code: i32, says: &[&str]) {
+        let out = self.try_run(more);
         let text = String::from_utf8_lossy(&out.stderr).into_owned();
         assert_eq!(out.status.code(), Some(code), "{text}");
         assert!(says.iter().all(|s| text.contains(s)), "{text}");
+    }
+    fn refused(&self, more: &[&str], code: i32, says: &[&str]) {
+        self.fails(&[&["--restart"], more].concat(), code, says);
     }
     /// monitor.csv, by exchange, without times.
     fn rows(&self) -> BTreeMap<i64, BTreeMap<String, f64>> {
@@ -82,6 +85,12 @@ fn both(name: &str, half: f64, options: &[&str]) -> (Case, Case) {
     for c in [&one, &two] {
         c.entry("writeInterval", &half.to_string());
     }
+    run_both(&one, &two, half, options);
+    (one, two)
+}
+
+/// The first case in one part, the second, which ends at T, in two.
+fn run_both(one: &Case, two: &Case, half: f64, options: &[&str]) {
     one.run(options);
     two.run(options);
     two.entry("endTime", &(2.0 * half).to_string());
@@ -89,7 +98,141 @@ fn both(name: &str, half: f64, options: &[&str]) -> (Case, Case) {
     let (a, b) = (one.rows(), two.rows());
     assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>(), "one row per exchange");
     assert!(b.values().all(|r| r["action_reaction_error"] <= 1e-12 && r["solid_volume_error"] <= 1e-12));
-    (one, two)
+}
+
+/// 216 spheres of 0.5 mm in a lattice settle, sheared, in the box of `settling`; the fluid is a stock solver's.
+fn stock(solver: &str, part: &str, end: f64, interval: f64) -> Case {
+    let c = Case::new("settling", &format!("{solver}-{part}"), end);
+    let change = |file: &str, pairs: &[(&str, &str)]| {
+        let text = std::fs::read_to_string(c.0.join(file)).unwrap();
+        let text = pairs.iter().fold(text, |t, (old, new)| {
+            assert!(t.contains(old), "{old}");
+            t.replace(old, new)
+        });
+        std::fs::write(c.0.join(file), text).unwrap();
+    };
+    let solver = format!("[fluid]\nsolver = \"{solver}\"");
+    let smooth = "method = \"gaussian\"\nbandwidth = 2e-2";
+    change(
+        "case.toml",
+        &[
+            ("[fluid]", &*solver),
+            ("interval = 20", "model = \"B\"\ninterval = 20"),
+            ("method = \"none\"", smooth),
+            ("[forces]", "[forces]\nviscous_stress = false"),
+        ],
+    );
+    change(
+        "particles.in",
+        &[
+            (
+                "neighbor ",
+                "lattice sc 0.013\nregion inner block 0.01 0.09 0.01 0.09 0.01 0.09 units box\nneighbor ",
+            ),
+            ("create_atoms 1 single 0.0512 0.0523 0.0941 units box", "create_atoms 1 region inner"),
+            ("density 3000\"", "density 3000\" \"velocity all ramp vx -0.1 0.1 z 0.01 0.09 units box\""),
+            ("diameter 1e-4", "diameter 5e-4"),
+            (
+                "run             1000000000",
+                "run 1000000000\nwrite_dump all custom final.txt id x y z vx vy vz modify sort id format \
+                 \"%d %.17g %.17g %.17g %.17g %.17g %.17g\"",
+            ),
+        ],
+    );
+    change("fluid/system/fvSolution", &[("PIMPLE", "\"(PIMPLE|PISO)\"")]);
+    change(
+        "fluid/system/controlDict",
+        &[("startTime 0;", "startTime 0;\nfunctions { voidage { type voidage; } }")],
+    );
+    std::fs::write(
+        c.0.join("fluid/constant/fvOptions"),
+        "FoamFile { version 2.0; format ascii; class dictionary; object fvOptions; }\n\
+         voidage { type voidageSource; voidageSourceCoeffs { fields (U); } }\n",
+    )
+    .unwrap();
+    c.entry("startFrom", "latestTime");
+    c.entry("writeInterval", &interval.to_string());
+    c
+}
+
+/// Fields, particles and books at the end are the same to the bit (books: as printed).
+fn same_end(one: &Case, two: &Case, time: &str, ranks: u32) {
+    let read = |c: &Case, file: &str| std::fs::read(c.0.join(file)).unwrap_or_else(|e| panic!("{file}: {e}"));
+    for rank in 0..ranks {
+        let part = if ranks == 1 { String::new() } else { format!("processor{rank}/") };
+        for name in ["U", "p", "phi"] {
+            let file = format!("fluid/{part}{time}/{name}");
+            assert!(read(one, &file) == read(two, &file), "{file}");
+        }
+    }
+    assert!(read(one, "final.txt") == read(two, "final.txt"), "particles");
+    let (a, b) = (one.rows(), two.rows());
+    assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>(), "one row per exchange");
+    assert!(b.values().all(|r| r["action_reaction_error"] <= 1e-12 && r["solid_volume_error"] <= 1e-12));
+    for (k, row) in &a {
+        assert!(*k == 0 || row["given_z"] != 0.0, "the fluid feels the particles");
+        // these two are rounding, in the order the DEM has its particles in
+        for (name, x) in row.iter().filter(|c| !["action_reaction_error", "ledger_left"].contains(&&**c.0)) {
+            assert!(*x == b[k][name], "{name} of exchange {k}: {x} and {}", b[k][name]);
+        }
+    }
+}
+
+/// A stock solver in one and in two parts, then from an earlier set.
+fn stock_in_two_parts(solver: &str, ranks: u32) {
+    let half = 0.01;
+    let (one, two) = (stock(solver, "one", 2.0 * half, 0.005), stock(solver, "two", half, 0.005));
+    let (dem, cfd) = (format!("run.dem_ranks={ranks}"), format!("run.cfd_ranks={ranks}"));
+    let options = ["--set", &*dem, "--set", &*cfd];
+    run_both(&one, &two, half, &options);
+    same_end(&one, &two, "0.02", ranks);
+    // an earlier set: the solver must be told
+    two.fails(
+        &[&options[..], &["--restart=0.015"]].concat(),
+        2,
+        &[
+            "would begin at t = 0.02",
+            "the restart set is of t = 0.015",
+            "startFrom startTime; startTime 0.015;",
+        ],
+    );
+    two.entry("startFrom", "startTime");
+    two.entry("startTime", "0.015");
+    two.run(&[&options[..], &["--restart=0.015"]].concat());
+    same_end(&one, &two, "0.02", ranks);
+}
+
+#[test]
+fn a_stock_solver_in_two_parts_is_the_same_to_the_bit() {
+    stock_in_two_parts("pimpleFoam", 1);
+}
+
+#[test]
+fn a_stock_solver_in_two_parts_is_the_same_to_the_bit_on_two_ranks_each() {
+    stock_in_two_parts("pisoFoam", 2);
+}
+
+#[test]
+fn a_stock_solver_that_begins_elsewhere_or_is_not_coupled_is_told_at_once() {
+    let begin = std::time::Instant::now();
+    let c = stock("pimpleFoam", "wrong", 0.002, 0.002);
+    c.run(&[]);
+    c.entry("endTime", "0.004");
+    c.entry("startFrom", "startTime");
+    c.refused(&[], 2, &["would begin at t = 0:", "startFrom startTime; startTime 0.002;"]);
+    // what the check cannot read the coupler sees
+    c.entry("application", "pimpleFoam; begin startTime");
+    c.entry("startFrom", "$begin");
+    c.refused(&[], 1, &["starts at t = 0 s, the restart set is of t = 0.002 s"]);
+    c.entry("startFrom", "startTime");
+    let options = c.0.join("fluid/constant/fvOptions");
+    let text = std::fs::read_to_string(&options).unwrap();
+    std::fs::remove_file(&options).unwrap();
+    c.fails(&[], 1, &["CFD rank 0 gave up: the solver took no sources in this step"]);
+    std::fs::write(&options, text).unwrap();
+    c.entry("functions", "{} //");
+    c.fails(&[], 1, &["CFD rank 0 gave up: the step before was not sent"]);
+    assert!(begin.elapsed().as_secs() < 40, "no wait runs to its limit");
 }
 
 #[test]

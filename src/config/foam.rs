@@ -59,18 +59,24 @@ impl Control {
     pub fn read(path: &Path) -> Result<Self, String> {
         let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
         let need = |key: &str| number(&text, key).ok_or(format!("{} has no number {key}", path.display()));
-        let from = entry(&text, "startFrom").unwrap_or_else(|| "startTime".into());
-        let start = if from == "startTime" { need("startTime")? } else { latest(path).unwrap_or(0.0) };
+        let case = path.ancestors().nth(2).unwrap_or(path);
+        let start = begin(&text, case).ok_or(format!("{} has no number startTime", path.display()))?;
         let adjustable = entry(&text, "adjustTimeStep").is_some_and(|v| ["yes", "on", "true"].contains(&&*v));
         Ok(Self { start, end: need("endTime")?, step: need("deltaT")?, adjustable })
     }
 }
 
-/// Latest time folder of the case that holds system/controlDict.
-fn latest(control: &Path) -> Option<f64> {
-    let case = control.parent()?.parent()?;
-    let names = std::fs::read_dir(case).ok()?.flatten().filter_map(|e| e.file_name().into_string().ok());
-    names.filter_map(|n| n.parse::<f64>().ok()).max_by(f64::total_cmp)
+/// Time (s) a solver begins at by the text of its controlDict, with the time folders in `place`: the case or a processor's part of it.
+pub fn begin(control: &str, place: &Path) -> Option<f64> {
+    let from = entry(control, "startFrom");
+    if from.as_deref() == Some("startTime") {
+        return number(control, "startTime");
+    }
+    let names = std::fs::read_dir(place).ok().into_iter().flatten().flatten();
+    let times = names.filter_map(|e| e.file_name().to_str()?.parse::<f64>().ok());
+    let first = from.as_deref() == Some("firstTime");
+    let found = if first { times.min_by(f64::total_cmp) } else { times.max_by(f64::total_cmp) };
+    Some(found.unwrap_or(0.0))
 }
 
 /// nu of constant/transportProperties, m2/s.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `voidage run --restart`: finds a set and refuses what does not fit together, before anything starts.
 
-use crate::config::{Config, Problem, script};
+use crate::config::{Config, Problem, foam, script};
 use crate::output::restart::{PARTICLES, State, folder, kept, sets};
 use std::path::{Path, PathBuf};
 
@@ -64,6 +64,7 @@ pub fn find(c: &Config, time: Option<f64>) -> Result<Restart, Vec<Problem>> {
 
 fn mismatches(c: &Config, r: &Restart) -> Vec<Problem> {
     let (f, s, mut p) = (&c.file, &r.state, Vec::new());
+    let slack = 1e-2 * c.period();
     let size = std::fs::metadata(r.particles()).map_or(0, |m| m.len());
     if size != s.particles_file {
         let accepted = format!("the coupler's file of this set goes with one of {} bytes", s.particles_file);
@@ -94,8 +95,20 @@ fn mismatches(c: &Config, r: &Restart) -> Vec<Problem> {
             1 => vec![case],
             n => (0..n).map(|i| case.join(format!("processor{i}"))).collect(),
         };
+        // voidageFoam is told the time, a stock solver goes by its controlDict
+        let control = std::fs::read_to_string(c.fluid_case().join("system/controlDict")).unwrap_or_default();
+        let begin =
+            foam::begin(&control, &places[0]).filter(|b| f.fluid.stock() && (b - s.time).abs() > slack);
+        if let (Some(begin), Some(at)) = (begin, time_folder(&places[0], s.time, slack)) {
+            let at = at.file_name().unwrap_or_default().display().to_string();
+            let given = format!("the solver would begin at t = {begin}");
+            let accepted =
+                format!("a stock solver begins where controlDict says, the restart set is of t = {at}");
+            let fix = format!("controlDict: startFrom startTime; startTime {at};");
+            p.push(Problem::error("startFrom", given, &accepted, fix));
+        }
         for place in places {
-            if time_folder(&place, s.time, 1e-2 * c.period())
+            if time_folder(&place, s.time, slack)
                 .is_none_or(|t| !t.join("U").exists() && !t.join("U.gz").exists())
             {
                 let accepted =
