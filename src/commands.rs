@@ -205,6 +205,9 @@ fn coupled(case: &Path, resolved: bool, restart: Option<&Path>) -> Result<(), St
     result
 }
 
+/// What diagram and own variance take each of a cell at the start, s of CPU, about (docs/bench.md).
+const PER_CELL: f64 = 5e-5;
+
 /// Mean non-orthogonality (degrees) from which the kernel is more than a few per cent off.
 const SKEW: f64 = 10.0;
 
@@ -225,11 +228,19 @@ fn exchange(
     }
     let mesh = receive_mesh(partners).map_err(|e| e.to_string())?;
     println!("mesh: {} cells of {} ranks", mesh.len(), session.cfd_ranks);
+    let (mapping, links) = (map::resolve(&config.file.map.method, &mesh), setup::links(config, &mesh));
+    println!("mapping: {} ({mapping})", config.file.map.method);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let made = usize::from(mapping == "max-entropy") + usize::from(links == "voronoi");
+    let expected = PER_CELL * (made * mesh.len() / cores) as f64;
+    if expected > 0.5 * session.wait {
+        println!(
+            "@warning preparing takes about {expected:.0} s on these cores, during which the partners wait: limits.wait = {:.0}",
+            4.0 * expected
+        );
+    }
     let begin = Instant::now();
     let step = setup::step(config, mesh)?;
-    let (mapping, links) =
-        (map::resolve(&config.file.map.method, &step.mesh), setup::links(config, &step.mesh));
-    println!("mapping: {} ({mapping})", config.file.map.method);
     let (asked, s) = (&config.file.smooth.method, step.smoother());
     let along = if links == "voronoi" { " along the Voronoi diagram of the centres" } else { "" };
     println!(
