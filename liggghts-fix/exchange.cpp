@@ -2,10 +2,10 @@
 // The exchange with the coupler: open, send the owned particles, receive what drives them. Copies only.
 
 #include "fix_voidage.h"
+#include "host.h"
 
 #include "atom.h"
 #include "comm.h"
-#include "error.h"
 #include "update.h"
 
 #include <cmath>
@@ -15,14 +15,11 @@
 
 using namespace LAMMPS_NS;
 
-namespace LAMMPS_NS { namespace SignalHandler { extern bool request_quit; } }
-
 // Ends this program on all ranks with a message; the coupler is told why.
 void FixVoidage::stop(const char *text)
 {
-  std::string message = std::string("fix voidage: ") + text;
   if (link_) voidage_fail(link_, text);
-  error->one(FLERR, message.c_str());
+  host::fail_one(lmp, std::string("fix voidage: ") + text);
 }
 
 double FixVoidage::setting(const char *name)
@@ -35,7 +32,7 @@ double FixVoidage::setting(const char *name)
 void FixVoidage::open()
 {
   link_ = voidage_open(VOIDAGE_DEM, comm->me, comm->nprocs, update->dt, update->ntimestep,
-                       update->ntimestep * update->dt, "LIGGGHTS 3.8.0");
+                       update->ntimestep * update->dt, host::version(lmp).c_str());
   if (!link_) stop(voidage_last_error());
   interval_ = (int)setting("coupling.interval");
   explicit_limit_ = setting("dem.explicit_limit");
@@ -148,11 +145,11 @@ void FixVoidage::receive()
   const int kind = voidage_receive(link_);
   if (kind == VOIDAGE_STOP) {
     const std::string reason = voidage_stop_reason(link_);
-    if (!reason.empty()) error->one(FLERR, ("fix voidage: the coupled run was stopped: " + reason).c_str());
+    if (!reason.empty()) host::fail_one(lmp, "fix voidage: the coupled run was stopped: " + reason);
     if (comm->me == 0 && screen) fprintf(screen, "fix voidage: the coupled run is complete at step " BIGINT_FORMAT "\n", update->ntimestep);
     if (comm->me == 0 && logfile) fprintf(logfile, "fix voidage: the coupled run is complete at step " BIGINT_FORMAT "\n", update->ntimestep);
     ended_ = quit_ = true;
-    SignalHandler::request_quit = true;  // leaves the loop of this `run` after this step
+    host::end_run(lmp);
     voidage_close(link_);
     link_ = NULL;
     return;

@@ -6,11 +6,11 @@
 // The exchange is in end_of_step, where v is at the full step: the new force replaces the old one in f.
 
 #include "fix_voidage.h"
+#include "host.h"
 
 #include "atom.h"
 #include "comm.h"
 #include "domain.h"
-#include "error.h"
 #include "force.h"
 #include "memory.h"
 #include "modify.h"
@@ -24,8 +24,6 @@
 using namespace LAMMPS_NS;
 using namespace FixConst;
 
-namespace LAMMPS_NS { namespace SignalHandler { extern bool request_quit; } }
-
 FixVoidage::FixVoidage(LAMMPS *lmp, int narg, char **arg)
   : Fix(lmp, narg, arg), link_(NULL), a_(NULL), width_(COLUMNS), memory_(0), rows_(0), first_step_(-1), exchange_(0),
     restored_(-1), last_(false), interval_(1), explicit_limit_(0.2), added_(0.0), history_(false), types_(false),
@@ -33,10 +31,12 @@ FixVoidage::FixVoidage(LAMMPS *lmp, int narg, char **arg)
 {
   check_host();
   if (narg != 3 || strcmp(arg[1], "all") != 0)
-    error->all(FLERR, "fix voidage: it takes no arguments and works on all particles; type: fix ID all voidage");
+    host::fail_all(lmp, "fix voidage: it takes no arguments and works on all particles; type: fix ID all voidage");
   if (!atom->radius_flag || !atom->rmass_flag || !atom->omega_flag)
-    error->all(FLERR, "fix voidage: the atom style has no radius, mass and angular velocity per particle; "
-                      "type: atom_style granular");
+    host::fail_all(lmp, std::string("fix voidage: the atom style has no radius, mass and angular velocity per particle; "
+                                    "type: atom_style ") + host::atom_style);
+  if (!atom->tag_enable)
+    host::fail_all(lmp, "fix voidage: the particles have no numbers; leave `atom_modify id no` out");
   for (int i = 0; i < 9; i++) totals_[i] = 0.0;
   nevery = 1;
   create_attribute = 1;
@@ -70,13 +70,13 @@ void FixVoidage::init()
     Fix *f = modify->fix[i];
     if (f == this) { after = true; continue; }
     if (strcmp(f->style, style) == 0)
-      error->all(FLERR, "fix voidage: there are two of them; keep one");
+      host::fail_all(lmp, "fix voidage: there are two of them; keep one");
     if (f->time_integrate) integrated_ |= f->groupbit;
     if (strncmp(f->style, "freeze", 6) == 0) frozen_ |= f->groupbit;
     if (after && (modify->fmask[i] & POST_FORCE) && strncmp(f->style, "freeze", 6) != 0) {
       std::string text = std::string("fix voidage: fix ") + f->id + " (" + f->style +
                          ") adds forces after it; put the line `fix ... voidage` behind it in the script";
-      error->all(FLERR, text.c_str());
+      host::fail_all(lmp, text);
     }
   }
 }
@@ -195,7 +195,7 @@ void FixVoidage::end_of_step()
 void FixVoidage::post_run()
 {
   if (!quit_) return;
-  SignalHandler::request_quit = false;  // so that later lines of the script run
+  host::run_ended(lmp);
   quit_ = false;
 }
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Into stock LIGGGHTS: registers the fix without rebuilding it, and refuses a host that does not fit.
+// Into stock LIGGGHTS or LAMMPS: registers the fix without rebuilding it, and refuses a host that does not fit.
 //
 // One symbol is interposed, the constructor of Modify: it runs the real one, then adds our creator to the
-// private map of fix styles (reached by an explicit template instantiation, which the language allows).
+// map of fix styles, private in LIGGGHTS (reached by an explicit template instantiation, which the language allows).
 
 #include "fix_voidage.h"
+#include "host.h"
 
 #include "atom.h"
 #include "comm.h"
 #include "domain.h"
-#include "error.h"
 #include "force.h"
 #include "group.h"
 #include "lammps.h"
@@ -54,7 +54,8 @@ extern "C" void _ZN9LAMMPS_NS6ModifyC1EPNS_6LAMMPSE(Modify *self, LAMMPS *lmp)
   typedef void (*Constructor)(Modify *, LAMMPS *);
   const Constructor real = (Constructor)dlsym(RTLD_NEXT, "_ZN9LAMMPS_NS6ModifyC1EPNS_6LAMMPSE");
   if (!real) {
-    fprintf(stderr, "voidage: this program is not LIGGGHTS 3.8.0 (no constructor of Modify); use Debian's liggghts\n");
+    fprintf(stderr, "voidage: this program is not %s (no constructor of Modify); use Debian's package %s\n",
+            host::program, host::package);
     abort();
   }
   real(self, lmp);
@@ -62,11 +63,11 @@ extern "C" void _ZN9LAMMPS_NS6ModifyC1EPNS_6LAMMPSE(Modify *self, LAMMPS *lmp)
   if (styles) (*styles)["voidage"] = &create;
 }
 
-// The classes of the running LIGGGHTS must be laid out as the headers this fix was compiled with say.
+// The classes of the running program must be laid out as the headers this fix was compiled with say.
 void FixVoidage::check_host()
 {
   const struct { const char *name; const void *object; size_t size; } classes[] = {
-    {"Atom", atom, sizeof(Atom)}, {"Comm", comm, sizeof(Comm)}, {"Domain", domain, sizeof(Domain)},
+    {"Atom", atom, sizeof(Atom)}, {"Comm", comm, host::size_of(comm)}, {"Domain", domain, sizeof(Domain)},
     {"Force", force, sizeof(Force)}, {"Group", group, sizeof(Group)}, {"Modify", modify, sizeof(Modify)},
     {"Neighbor", neighbor, sizeof(Neighbor)}, {"Output", output, sizeof(Output)}, {"Timer", timer, sizeof(Timer)},
     {"Update", update, sizeof(Update)}};
@@ -74,9 +75,9 @@ void FixVoidage::check_host()
     const size_t got = malloc_usable_size(const_cast<void *>(classes[i].object)), want = usable(classes[i].size);
     if (got < classes[i].size || got > want + 16) {
       char text[400];
-      snprintf(text, sizeof text, "fix voidage: class %s of this LIGGGHTS has %zu bytes, the fix was built for %zu: "
-               "another version is installed; type: ./setup build", classes[i].name, got, classes[i].size);
-      error->all(FLERR, text);
+      snprintf(text, sizeof text, "fix voidage: class %s of this %s has %zu bytes, the fix was built for %zu: "
+               "another version is installed; type: ./setup build", classes[i].name, host::program, got, classes[i].size);
+      host::fail_all(lmp, text);
     }
   }
 }

@@ -1,18 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-// Restart of a coupled run: the fix's table goes into LIGGGHTS' own restart file, written when the coupler asks
+// Restart of a coupled run: the fix's table goes into the program's own restart file, written when the coupler asks
 // (the fluid's write times), and comes back by `read_restart` and the same `fix` line.
 //
-// Beside the table each atom carries the force and torque it had: LIGGGHTS would compute them anew from full-step
+// Beside the table each atom carries the force and torque it had: the program would compute them anew from full-step
 // velocities, and damping in contacts would act a little otherwise in the first half kick.
 
 #include "fix_voidage.h"
+#include "host.h"
 
 #include "atom.h"
 #include "comm.h"
-#include "error.h"
-#include "modify.h"
 #include "update.h"
-#include "write_restart.h"
 
 #include <cstdio>
 #include <cstring>
@@ -35,7 +33,7 @@ void FixVoidage::restart(char *buf)
   double list[3];
   memcpy(list, buf, sizeof list);
   if ((int)list[0] != (int)COLUMNS)
-    error->all(FLERR, "fix voidage: the restart file comes from another version of the fix; start the run anew");
+    host::fail_all(lmp, "fix voidage: the restart file comes from another version of the fix; start the run anew");
   restored_ = (bigint)list[1];
   widen((int)list[2]);
 }
@@ -92,12 +90,8 @@ void FixVoidage::resume(bigint first)
 void FixVoidage::save()
 {
   if (restart_file_.empty()) return;
-  // contacts are copied to the atoms only when neighbours are rebuilt: copy them now
-  for (int i = 0; i < modify->nfix; i++)
-    if (strcmp(modify->fix[i]->style, "contacthistory") == 0) modify->fix[i]->setup_pre_exchange();
-  std::string part = restart_file_ + ".part";
-  WriteRestart writer(lmp);
-  writer.write(&part[0]);
+  const std::string part = restart_file_ + ".part";
+  host::write_restart(lmp, part);
   MPI_Barrier(world);
   if (comm->me == 0 && rename(part.c_str(), restart_file_.c_str()) != 0)
     stop(("the restart file " + restart_file_ + " could not be written; is the disk full?").c_str());

@@ -402,7 +402,18 @@ pub fn version() -> u8 {
         println!("{package}: {}", found.unwrap_or_else(|| "not installed as a package".into()));
     }
     match launch::companions() {
-        Ok(c) => println!("solver: {}\nfix: {}", c.solver.display(), c.fix.display()),
+        Ok(c) => {
+            println!("solver: {}", c.solver.display());
+            for program in &config::program::PROGRAMS {
+                let fix = c.fix(program);
+                let found = if fix.exists() {
+                    fix.display().to_string()
+                } else {
+                    format!("not built: type {}", program.setup)
+                };
+                println!("fix for {}: {found}", program.title);
+            }
+        }
         Err(e) => println!("{e}"),
     }
     OK

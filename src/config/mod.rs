@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The case file: `raw` reads case.toml (unknown keys refused), `check` finds what cannot work.
 //!
-//! `foam` and `script` read the few facts needed from OpenFOAM dictionaries and LIGGGHTS scripts. All problems
-//! are reported at once, each with where, what was given, what is accepted and what to type. `bandwidth` and
-//! `resolution` put numbers to what is too coarse.
+//! `foam` and `script` read the few facts needed from OpenFOAM dictionaries and scripts of the particle
+//! programs in `program`. All problems are reported at once, each with where, what was given, what is accepted and what to type.
+//! `bandwidth` and `resolution` put numbers to what is too coarse.
 
 mod bandwidth;
 mod check;
 pub mod foam;
+pub mod program;
 mod raw;
 pub(crate) mod resolution;
 pub mod script;

@@ -120,7 +120,7 @@ fn implicit() -> InInterval {
     InInterval::Implicit
 }
 fn liggghts() -> String {
-    "liggghts".into()
+    super::program::PROGRAMS[0].name.into()
 }
 
 /// Parcel diameter / primary diameter.
@@ -468,7 +468,7 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ),
     ("fluid.mean_pressure_gradient", "Pa/m", "[0,0,0]", "prescribed mean gradient, for periodic boxes"),
     ("fluid.flow", "", "solved", "solved | frozen"),
-    ("dem.program", "", "liggghts", "particle program"),
+    ("dem.program", "", "liggghts", "particle program: liggghts | lammps (./setup lammps; liggghts-fix/README.md)"),
     ("dem.script", "", "-", "its input script"),
     ("dem.time_step", "s", "-", "must equal `timestep` of the script"),
     ("dem.force", "", "implicit", "implicit (K(u-v)+f in each DEM step) | constant"),
@@ -756,7 +756,7 @@ fn names(file: &CaseFile) -> Vec<Problem> {
     check("interpolate.fluid_velocity", &file.interpolate.fluid_velocity, FluidVelocity::NAMES.to_vec());
     check("limits.outside", &file.limits.outside, vec!["error", "exclude"]);
     check("output.picture", &file.output.picture, vec!["none", "x", "y", "z"]);
-    check("dem.program", &file.dem.program, vec!["liggghts"]);
+    check("dem.program", &file.dem.program, super::program::PROGRAMS.iter().map(|p| p.name).collect());
     for key in file.auto.iter().flat_map(|a| &a.keep) {
         check("auto.keep", key, crate::auto::KEYS.to_vec());
     }

@@ -7,7 +7,7 @@ pub mod prepare;
 pub mod restart;
 mod ui;
 
-use crate::config::Config;
+use crate::config::{Config, program::Program};
 use groups::{Group, Groups};
 use restart::Restart;
 use std::path::{Path, PathBuf};
@@ -39,8 +39,15 @@ pub struct Companions {
     pub solver: PathBuf,
     /// function object and fvOption for stock solvers
     pub stock: PathBuf,
-    /// the LIGGGHTS fix
-    pub fix: PathBuf,
+    /// where the fixes of the particle programs are
+    pub libraries: PathBuf,
+}
+
+impl Companions {
+    /// The fix for a particle program.
+    pub fn fix(&self, program: &Program) -> PathBuf {
+        self.libraries.join(program.library)
+    }
 }
 
 /// Finds them: $VOIDAGE_HOME, the prefix this program is in, or the build tree it was made in.
@@ -59,8 +66,22 @@ pub fn companions() -> Result<Companions, String> {
         voidage: exe,
         solver: home.join("bin/voidageFoam"),
         stock: home.join("lib/libvoidageFoam.so"),
-        fix: home.join("lib/libvoidageLiggghts.so"),
+        libraries: home.join("lib"),
     })
+}
+
+/// Refuses a particle program that is not there: mpirun's words for it are long and name no remedy.
+fn installed(program: &Program, home: &Companions) -> Result<(), String> {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let missing = if !std::env::split_paths(&path).any(|p| p.join(program.executable).exists()) {
+        format!("{} is not on the PATH", program.executable)
+    } else if !home.fix(program).exists() {
+        format!("{} is missing", home.fix(program).display())
+    } else {
+        return Ok(());
+    };
+    let Program { name, title, setup, .. } = program;
+    Err(format!("dem.program = \"{name}\": {title} is not set up ({missing}); type {setup}"))
 }
 
 fn mpirun(ranks: u32, shared: &Path, own: &Path, export: &[&str]) -> Vec<String> {
@@ -85,6 +106,7 @@ fn mpirun(ranks: u32, shared: &Path, own: &Path, export: &[&str]) -> Vec<String>
 /// Runs a case to its end. `stop` is set by Ctrl-C.
 pub fn run(config: &Config, from: Option<&Restart>, stop: &AtomicBool) -> Result<Outcome, String> {
     let home = companions()?;
+    installed(config.program(), &home)?;
     let logs = config.folder.join("logs");
     if let Some(r) = from.filter(|_| logs.exists()) {
         // the logs of the part before stay
@@ -96,7 +118,7 @@ pub fn run(config: &Config, from: Option<&Restart>, stop: &AtomicBool) -> Result
     std::fs::create_dir_all(&logs).map_err(|e| format!("{}: {e}", logs.display()))?;
     restart::forget(&config.folder, from.map(|r| r.state.time))
         .map_err(|e| format!("old restart sets: {e}"))?;
-    let _ = std::fs::remove_file(logs.join("liggghts.log")); // an old one must not explain a new failure
+    let _ = std::fs::remove_file(own_log(config, &logs)); // an old one must not explain a new failure
     for token in voidage_shm::janitor::clean_dead().map_err(|e| e.to_string())? {
         tracing::info!("removed what the dead run {token} left behind");
     }
@@ -113,6 +135,11 @@ pub fn run(config: &Config, from: Option<&Restart>, stop: &AtomicBool) -> Result
     result
 }
 
+/// The log the particle program writes itself.
+fn own_log(config: &Config, logs: &Path) -> PathBuf {
+    logs.join(format!("{}.log", config.program().name))
+}
+
 fn start(
     config: &Config,
     home: &Companions,
@@ -125,7 +152,8 @@ fn start(
     let session = format!("{}={}", session::VARIABLE, s.file().display());
     let foam = std::env::var("WM_PROJECT_DIR").unwrap_or_else(|_| "/usr/share/openfoam".into());
     let foam = format!("WM_PROJECT_DIR={foam}");
-    let preload = format!("LD_PRELOAD={}", home.fix.display());
+    let program = config.program();
+    let preload = format!("LD_PRELOAD={}", home.fix(program).display());
     let text = |p: &Path| p.display().to_string();
 
     let shared =
@@ -141,11 +169,11 @@ fn start(
     couple.extend(from.iter().flat_map(|r| ["--restart".to_string(), text(&r.folder)]));
     let mut dem = mpirun(f.run.dem_ranks, &shared, &own("md")?, &[&session, &preload]);
     dem.extend([
-        f.dem.program.clone(),
+        program.executable.into(),
         "-in".into(),
         text(&f.dem.script),
         "-log".into(),
-        text(&logs.join("liggghts.log")),
+        text(&own_log(config, logs)),
     ]);
     dem.extend(f.dem.variables.iter().flat_map(|(k, v)| ["-var".to_string(), k.clone(), v.clone()]));
     let file = from.map_or_else(|| "none".into(), |r| text(&r.particles()));
@@ -169,7 +197,7 @@ fn start(
         command,
         cwd: config.folder.clone(),
         log: logs.join(log),
-        own_log: (name == "dem").then(|| logs.join("liggghts.log")),
+        own_log: (name == "dem").then(|| own_log(config, logs)),
     };
     let plan =
         [group("couple", couple, "couple.log"), group("dem", dem, "dem.log"), group("cfd", cfd, "cfd.log")];
