@@ -20,7 +20,7 @@ pub fn check(c: &Config) -> Vec<Problem> {
             "dem.script",
             c.file.dem.script.display(),
             e,
-            "set dem.script to the LIGGGHTS script",
+            format!("set dem.script to the {} script", c.program().title),
         )),
         Ok(s) => dem(c, s, &mut p),
     }
@@ -350,6 +350,11 @@ fn dem(c: &Config, s: &script::Script, p: &mut Vec<Problem>) {
     }
     if let Some(u) = s.units.as_deref().filter(|u| *u != "si") {
         p.push(Problem::error("units", u, "the coupling works in SI", "in the script: units si"));
+    }
+    let program = c.program();
+    for (command, instead) in s.commands.iter().filter_map(|c| program.instead(c).map(|i| (c, i))) {
+        let accepted = format!("a command of {}, dem.program is \"{}\"", program.other().title, program.name);
+        p.push(Problem::error("dem.script", command, &accepted, format!("in the script: {instead}")));
     }
     if !s.has_fix {
         let accepted = "the script has no `fix ... voidage`: nothing would be coupled";

@@ -468,7 +468,12 @@ pub const KEYS: &[(&str, &str, &str, &str)] = &[
     ),
     ("fluid.mean_pressure_gradient", "Pa/m", "[0,0,0]", "prescribed mean gradient, for periodic boxes"),
     ("fluid.flow", "", "solved", "solved | frozen"),
-    ("dem.program", "", "liggghts", "particle program: liggghts | lammps (./setup lammps; liggghts-fix/README.md)"),
+    (
+        "dem.program",
+        "",
+        "liggghts",
+        "particle program: liggghts | lammps (./setup lammps; liggghts-fix/README.md)",
+    ),
     ("dem.script", "", "-", "its input script"),
     ("dem.time_step", "s", "-", "must equal `timestep` of the script"),
     ("dem.force", "", "implicit", "implicit (K(u-v)+f in each DEM step) | constant"),
