@@ -11,6 +11,7 @@ import tempfile
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 VOIDAGE = os.path.join(ROOT, "build", "bin", "voidage")
 ALL_RANKS = [(1, 1), (2, 1), (1, 2), (2, 2)]  # (DEM, CFD)
+LAMMPS = {"dem.program": "lammps", "dem.script": "lammps.in"}  # settings of a run with LAMMPS; needs ./setup lammps
 
 
 class Check:
@@ -96,7 +97,7 @@ def log(folder, name):
 
 
 def thermo(folder, columns):
-    """Rows of LIGGGHTS' thermo output with that many columns."""
+    """Rows of the DEM's thermo output with that many columns."""
     rows = []
     for line in log(folder, "dem").splitlines():
         words = line.split()

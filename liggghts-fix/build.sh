@@ -15,7 +15,7 @@ abi=$here/../adapters/client/include
 newer=$(find "$here" "$abi" "$library" \( -name '*.cpp' -o -name '*.h' -o -name '*.sh' -o -name 'lib*' \) -newer "$out" 2>/dev/null || echo all)
 [ -e "$out" ] && [ -z "$newer" ] && exit 0
 mkdir -p "$prefix/lib"
-OMPI_CXX=g++ mpicxx -std=c++11 -O2 -fPIC -Wall -Wextra -Wno-unused-parameter -isystem "$headers" -I"$abi" -shared \
+OMPI_CXX=g++ mpicxx -std=c++11 -O2 -fPIC -Wall -Wextra -Wno-unused-parameter "-fmacro-prefix-map=$here=liggghts-fix" -isystem "$headers" -I"$abi" -shared \
   -o "$out.part" "$here/fix_voidage.cpp" "$here/exchange.cpp" "$here/restart.cpp" "$here/host.cpp" \
   "$here/host_$program.cpp" "$library" -L"$prefix/lib" -lvoidage_client -ldl '-Wl,-rpath,$ORIGIN' -Wl,--no-undefined
 mv "$out.part" "$out"

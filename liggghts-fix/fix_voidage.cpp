@@ -64,6 +64,9 @@ int FixVoidage::setmask() { return POST_FORCE | END_OF_STEP; }
 
 void FixVoidage::init()
 {
+  if (strncmp(update->integrate_style, "verlet", 6) != 0)
+    host::fail_all(lmp, std::string("fix voidage: run_style ") + update->integrate_style +
+                          " does not call it in every step; type: run_style verlet");
   integrated_ = frozen_ = 0;
   bool after = false;
   for (int i = 0; i < modify->nfix; i++) {

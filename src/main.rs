@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use voidage::commands;
 
-/// Couples OpenFOAM and LIGGGHTS: CFD-DEM with exact action and reaction.
+/// Couples OpenFOAM with LIGGGHTS or LAMMPS: CFD-DEM with exact action and reaction.
 #[derive(Parser)]
 #[command(version, propagate_version = true)]
 struct Arguments {

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::folder::{copy, root};
+use common::folder::{PROGRAMS, copy_case, root};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -35,9 +35,9 @@ impl Drop for Scratch {
 }
 
 /// A copy of the settling case that would run for minutes.
-fn long_case(name: &str) -> Scratch {
+fn long_case(name: &str, program: &str) -> Scratch {
     let s = Scratch::new(name);
-    copy(&root().join("cases/settling"), &s.case());
+    copy_case("settling", &s.case(), program);
     edit(&s.case().join("fluid/system/controlDict"), "endTime 0.24;", "endTime 40;");
     s
 }
@@ -106,7 +106,7 @@ fn kill(pid: u32, signal: &str) {
 }
 
 fn dies(name: &str, program: &str, signal: &str, says: &str, code: i32) {
-    let s = long_case(name);
+    let s = long_case(name, if program == "lmp" { "lammps" } else { "liggghts" });
     let mut child = start(&s.case(), &["run.dem_ranks=2", "run.cfd_ranks=2"]);
     under_way(&s.case(), &mut child);
     let pid = child.id();
@@ -138,6 +138,7 @@ fn dies(name: &str, program: &str, signal: &str, says: &str, code: i32) {
 #[test]
 fn a_killed_dem_rank_ends_the_run_and_is_named() {
     dies("dem", "liggghts", "-KILL", "DEM rank", 1);
+    dies("dem-lammps", "lmp", "-KILL", "DEM rank", 1);
 }
 
 #[test]
@@ -157,19 +158,22 @@ fn ctrl_c_stops_everything() {
 
 #[test]
 fn a_stalled_partner_is_named_after_the_limit() {
-    let s = long_case("stall");
-    let mut child = start(&s.case(), &["limits.wait=2"]);
-    under_way(&s.case(), &mut child);
-    let victim = family(child.id()).iter().rev().find(|p| p.1 == "liggghts").unwrap().0;
-    kill(victim, "-STOP");
-    let (out, took) = finish(child, Duration::from_secs(25));
-    let text = String::from_utf8_lossy(&out.stderr).into_owned();
-    assert!(text.contains("DEM rank 0 sent no particles for 2 s"), "{text}");
-    assert!(took < Duration::from_secs(15) && out.status.code() == Some(1));
+    for program in PROGRAMS {
+        let s = long_case("stall", program);
+        let mut child = start(&s.case(), &["limits.wait=2"]);
+        under_way(&s.case(), &mut child);
+        let victim =
+            family(child.id()).iter().rev().find(|p| ["liggghts", "lmp"].contains(&&*p.1)).unwrap().0;
+        kill(victim, "-STOP");
+        let (out, took) = finish(child, Duration::from_secs(25));
+        let text = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(text.contains("DEM rank 0 sent no particles for 2 s"), "{text}");
+        assert!(took < Duration::from_secs(15) && out.status.code() == Some(1));
+    }
 }
 
 fn refuse(name: &str, file: &str, old: &str, new: &str, says: &[&str]) {
-    let s = long_case(name);
+    let s = long_case(name, "liggghts");
     edit(&s.case().join(file), old, new);
     let out = voidage().arg("check").arg(s.case()).output().unwrap();
     let text = String::from_utf8_lossy(&out.stderr).into_owned();
@@ -240,7 +244,7 @@ fn bad_input_is_refused_with_where_what_accepted_and_what_to_type() {
 
 #[test]
 fn all_problems_are_told_at_once() {
-    let s = long_case("many");
+    let s = long_case("many", "liggghts");
     let out = voidage()
         .arg("check")
         .arg(s.case())
@@ -255,66 +259,75 @@ fn all_problems_are_told_at_once() {
 
 #[test]
 fn errors_of_the_partners_reach_the_user() {
-    let s = long_case("partner");
-    edit(&s.case().join("particles.in"), "atom_style      granular", "atom_style      granular\nnonsense");
-    let (out, _) = finish(start(&s.case(), &[]), Duration::from_secs(40));
-    let text = String::from_utf8_lossy(&out.stderr).into_owned();
-    assert!(out.status.code() == Some(1) && text.contains("Unknown command: nonsense"), "{text}");
-    let s = long_case("order");
-    edit(
-        &s.case().join("particles.in"),
-        "fix             voidage all voidage",
-        "fix             voidage all voidage\nfix late all gravity 1 vector 0 0 1",
-    );
-    let (out, _) = finish(start(&s.case(), &[]), Duration::from_secs(40));
-    let text = String::from_utf8_lossy(&out.stderr).into_owned();
-    assert!(text.contains("fix late (gravity) adds forces after it"), "{text}");
+    for program in PROGRAMS {
+        let s = long_case("partner", program);
+        edit(&s.case().join("particles.in"), "boundary        f f f", "boundary        f f f\nnonsense");
+        let (out, _) = finish(start(&s.case(), &[]), Duration::from_secs(40));
+        let text = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.code() == Some(1) && text.contains("Unknown command: nonsense"), "{text}");
+        let s = long_case("order", program);
+        edit(
+            &s.case().join("particles.in"),
+            "fix             voidage all voidage",
+            "fix             voidage all voidage\nfix late all gravity 1 vector 0 0 1",
+        );
+        let (out, _) = finish(start(&s.case(), &[]), Duration::from_secs(40));
+        let text = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(text.contains("fix late (gravity) adds forces after it"), "{text}");
+    }
 }
 
 #[test]
 fn lines_after_run_are_executed_when_the_fluid_ends() {
-    let s = Scratch::new("end");
-    copy(&root().join("cases/settling"), &s.case());
-    edit(&s.case().join("fluid/system/controlDict"), "endTime 0.24;", "endTime 0.004;");
-    let (out, _) = finish(start(&s.case(), &[]), Duration::from_secs(60));
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-    let log = std::fs::read_to_string(s.case().join("logs/dem.log")).unwrap();
-    assert!(
-        log.contains("the coupled run is complete at step 400") && log.contains("terminal velocity"),
-        "{log}"
-    );
+    for program in PROGRAMS {
+        let s = Scratch::new("end");
+        copy_case("settling", &s.case(), program);
+        edit(&s.case().join("fluid/system/controlDict"), "endTime 0.24;", "endTime 0.004;");
+        let (out, _) = finish(start(&s.case(), &[]), Duration::from_secs(60));
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let log = std::fs::read_to_string(s.case().join("logs/dem.log")).unwrap();
+        assert!(
+            log.contains("the coupled run is complete at step 400") && log.contains("terminal velocity"),
+            "{log}"
+        );
+    }
 }
 
 #[test]
 fn added_mass_and_lift_keep_the_third_law() {
-    let s = Scratch::new("added-mass");
-    copy(&root().join("cases/settling"), &s.case());
-    edit(&s.case().join("fluid/system/controlDict"), "endTime 0.24;", "endTime 0.01;");
-    let set = ["forces.added_mass=0.5", "forces.lift=loth", "coupling.feedback=two-way"];
-    let (out, _) = finish(start(&s.case(), &set), Duration::from_secs(60));
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-    let rows = std::fs::read_to_string(s.case().join("monitor.csv")).unwrap();
-    let mut lines = rows.lines();
-    let column = lines.next().unwrap().split(',').position(|c| c.contains("action_reaction")).unwrap();
-    let errors: Vec<f64> = lines.map(|l| l.split(',').nth(column).unwrap().parse().unwrap_or(0.0)).collect();
-    assert!(errors.len() > 20 && errors.iter().any(|e| *e > 0.0), "{errors:?}");
-    assert!(errors.iter().all(|e| *e <= 1e-12), "{errors:?}");
+    for program in PROGRAMS {
+        let s = Scratch::new("added-mass");
+        copy_case("settling", &s.case(), program);
+        edit(&s.case().join("fluid/system/controlDict"), "endTime 0.24;", "endTime 0.01;");
+        let set = ["forces.added_mass=0.5", "forces.lift=loth", "coupling.feedback=two-way"];
+        let (out, _) = finish(start(&s.case(), &set), Duration::from_secs(60));
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let rows = std::fs::read_to_string(s.case().join("monitor.csv")).unwrap();
+        let mut lines = rows.lines();
+        let column = lines.next().unwrap().split(',').position(|c| c.contains("action_reaction")).unwrap();
+        let errors: Vec<f64> =
+            lines.map(|l| l.split(',').nth(column).unwrap().parse().unwrap_or(0.0)).collect();
+        assert!(errors.len() > 20 && errors.iter().any(|e| *e > 0.0), "{errors:?}");
+        assert!(errors.iter().all(|e| *e <= 1e-12), "{errors:?}");
+    }
 }
 
 #[test]
 fn a_light_sphere_is_released_with_the_inertia_of_its_added_mass() {
-    let s = Scratch::new("light");
-    copy(&root().join("cases/settling"), &s.case());
-    edit(&s.case().join("fluid/system/controlDict"), "endTime 0.24;", "endTime 0.01;");
-    edit(&s.case().join("particles.in"), "density 3000", "density 5");
-    let set = ["forces.added_mass=0.5", "forces.drag=none", "coupling.feedback=one-way"];
-    let (out, _) = finish(start(&s.case(), &set), Duration::from_secs(60));
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-    let log = std::fs::read_to_string(s.case().join("logs/dem.log")).unwrap();
-    let line = log.lines().rfind(|l| l.starts_with("terminal velocity")).unwrap();
-    let rise = -line.split(' ').next_back().unwrap().parse::<f64>().unwrap();
-    // (m_f − m) g/(m + ½ m_f) for 0.01 s: 5·9.81/10
-    assert!((rise / (4.905 * 0.01) - 1.0).abs() < 1e-5, "{line}");
+    for program in PROGRAMS {
+        let s = Scratch::new("light");
+        copy_case("settling", &s.case(), program);
+        edit(&s.case().join("fluid/system/controlDict"), "endTime 0.24;", "endTime 0.01;");
+        edit(&s.case().join("particles.in"), "density 3000", "density 5");
+        let set = ["forces.added_mass=0.5", "forces.drag=none", "coupling.feedback=one-way"];
+        let (out, _) = finish(start(&s.case(), &set), Duration::from_secs(60));
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let log = std::fs::read_to_string(s.case().join("logs/dem.log")).unwrap();
+        let line = log.lines().rfind(|l| l.starts_with("terminal velocity")).unwrap();
+        let rise = -line.split(' ').next_back().unwrap().parse::<f64>().unwrap();
+        // (m_f − m) g/(m + ½ m_f) for 0.01 s: 5·9.81/10
+        assert!((rise / (4.905 * 0.01) - 1.0).abs() < 1e-5, "{line}");
+    }
 }
 
 /// The number printed behind these words at the end of the script.
@@ -326,93 +339,190 @@ fn printed(case: &Path, what: &str) -> f64 {
 
 #[test]
 fn a_spinning_sphere_in_still_fluid_slows_down_as_kirchhoff_says() {
-    // heavy: explicit in each DEM step; light: K_w dt/I = 1.2, exact relaxation
-    for (density, end, relaxation) in
-        [(3000.0, 0.01, 3000.0 * 1e-8 / (60.0 * 1e-4)), (5.0, 0.0002, 5.0 * 1e-8 / (60.0 * 1e-4))]
-    {
-        let s = Scratch::new(&format!("spin{density}"));
-        copy(&root().join("cases/settling"), &s.case());
-        edit(&s.case().join("fluid/system/controlDict"), "endTime 0.24;", &format!("endTime {end};"));
-        let script = s.case().join("particles.in");
-        edit(&script, "density 3000", &format!("density {density} omegay 100"));
-        edit(
-            &script,
-            "variable        speed",
-            "compute w all property/atom omegay\nvariable spin equal c_w[1]\nvariable        speed",
-        );
-        edit(&script, "v_speed v_height", "v_spin v_speed v_height");
-        edit(&script, "thermo          200", "thermo 4");
-        edit(&script, "print  ", "print \"spin ${spin}\"\nprint  ");
-        let set = ["forces.torque=true", "coupling.feedback=one-way", "forces.drag=none"];
-        let (out, _) = finish(start(&s.case(), &set), Duration::from_secs(60));
-        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-        // I dw/dt = −8 π μ r³ w: relaxation time ρ_p d²/(60 μ)
-        let (spin, exact) = (printed(&s.case(), "spin "), 100.0 * f64::exp(-end / relaxation));
-        let error = (spin - exact).abs() / exact.max(1e-6);
-        assert!(error < 2e-3, "{density}: {spin:e} {exact:e}");
+    for program in PROGRAMS {
+        let spin = if program == "lammps" { "omega 0 100 0" } else { "omegay 100" };
+        // heavy: explicit in each DEM step; light: K_w dt/I = 1.2, exact relaxation
+        for (density, end, relaxation) in
+            [(3000.0, 0.01, 3000.0 * 1e-8 / (60.0 * 1e-4)), (5.0, 0.0002, 5.0 * 1e-8 / (60.0 * 1e-4))]
+        {
+            let s = Scratch::new(&format!("spin{density}"));
+            copy_case("settling", &s.case(), program);
+            edit(&s.case().join("fluid/system/controlDict"), "endTime 0.24;", &format!("endTime {end};"));
+            let script = s.case().join("particles.in");
+            edit(&script, "density 3000", &format!("density {density} {spin}"));
+            edit(
+                &script,
+                "variable        speed",
+                "compute w all property/atom omegay\nvariable spin equal c_w[1]\nvariable        speed",
+            );
+            edit(&script, "v_speed v_height", "v_spin v_speed v_height");
+            edit(&script, "thermo          200", "thermo 4");
+            edit(&script, "print  ", "print \"spin ${spin}\"\nprint  ");
+            let set = ["forces.torque=true", "coupling.feedback=one-way", "forces.drag=none"];
+            let (out, _) = finish(start(&s.case(), &set), Duration::from_secs(60));
+            assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+            // I dw/dt = −8 π μ r³ w: relaxation time ρ_p d²/(60 μ)
+            let (spin, exact) = (printed(&s.case(), "spin "), 100.0 * f64::exp(-end / relaxation));
+            let error = (spin - exact).abs() / exact.max(1e-6);
+            assert!(error < 2e-3, "{density}: {spin:e} {exact:e}");
+        }
     }
 }
 
 #[test]
 fn a_sphere_released_in_a_liquid_falls_as_bassets_equation_says() {
-    let s = Scratch::new("basset");
-    copy(&root().join("cases/settling"), &s.case());
-    let control = s.case().join("fluid/system/controlDict");
-    edit(&control, "endTime 0.24;", "endTime 0.004;");
-    edit(&control, "deltaT 2e-4;", "deltaT 2e-5;");
-    edit(&s.case().join("fluid/constant/transportProperties"), "nu 1e-5;", "nu 1e-6;");
-    edit(&s.case().join("particles.in"), "density 3000", "density 2650");
-    let common = [
-        "fluid.density=1000.0",
-        "fluid.kinematic_viscosity=1e-6",
-        "fluid.flow=frozen",
-        "coupling.interval=2",
-        "coupling.feedback=one-way",
-        "forces.drag=stokes",
-        "forces.added_mass=0.5",
-    ];
-    // (m + m_f/2) dv/dt + 3π μ d v + 3/2 d² √(π ρ μ) ∫ v'/√(t−τ) = (m − m_f) g, inverted numerically from
-    // V(s) = A/(s (M s + B √s + C)), at 4 ms; without the history A/C (1 − e^{−C t/M})
-    for (history, exact) in [(true, 4.936934e-3), (false, 8.077950e-3)] {
-        let history = format!("forces.history={history}");
-        let set: Vec<&str> = common.iter().copied().chain([history.as_str()]).collect();
-        let (out, _) = finish(start(&s.case(), &set), Duration::from_secs(120));
-        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-        let fall = printed(&s.case(), "terminal velocity");
-        assert!((fall / exact - 1.0).abs() < 0.02, "{history}: {fall:e} {exact:e}");
+    for program in PROGRAMS {
+        let s = Scratch::new("basset");
+        copy_case("settling", &s.case(), program);
+        let control = s.case().join("fluid/system/controlDict");
+        edit(&control, "endTime 0.24;", "endTime 0.004;");
+        edit(&control, "deltaT 2e-4;", "deltaT 2e-5;");
+        edit(&s.case().join("fluid/constant/transportProperties"), "nu 1e-5;", "nu 1e-6;");
+        edit(&s.case().join("particles.in"), "density 3000", "density 2650");
+        let common = [
+            "fluid.density=1000.0",
+            "fluid.kinematic_viscosity=1e-6",
+            "fluid.flow=frozen",
+            "coupling.interval=2",
+            "coupling.feedback=one-way",
+            "forces.drag=stokes",
+            "forces.added_mass=0.5",
+        ];
+        // (m + m_f/2) dv/dt + 3π μ d v + 3/2 d² √(π ρ μ) ∫ v'/√(t−τ) = (m − m_f) g, inverted numerically from
+        // V(s) = A/(s (M s + B √s + C)), at 4 ms; without the history A/C (1 − e^{−C t/M})
+        for (history, exact) in [(true, 4.936934e-3), (false, 8.077950e-3)] {
+            let history = format!("forces.history={history}");
+            let set: Vec<&str> = common.iter().copied().chain([history.as_str()]).collect();
+            let (out, _) = finish(start(&s.case(), &set), Duration::from_secs(120));
+            assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+            let fall = printed(&s.case(), "terminal velocity");
+            assert!((fall / exact - 1.0).abs() < 0.02, "{history}: {fall:e} {exact:e}");
+        }
     }
 }
 
 #[test]
 fn all_models_at_once_on_two_ranks_keep_the_third_law() {
-    let s = Scratch::new("models");
-    copy(&root().join("cases/periodic-box"), &s.case());
-    edit(&s.case().join("fluid/system/controlDict"), "endTime 2.0826;", "endTime 0.00712;");
-    let set = [
-        "run.dem_ranks=2",
-        "run.cfd_ranks=2",
-        "forces.history=true",
-        "forces.torque=true",
-        "forces.added_mass=felderhof",
-        "forces.lift=saffman-mei",
-        "dem.coarse_graining={ 1 = 1.5 }",
-        "smooth.by_diameter=[[2e-4, 4e-4]]",
-        "smooth.largest_cell=1e-3",
+    for program in PROGRAMS {
+        let s = Scratch::new("models");
+        copy_case("periodic-box", &s.case(), program);
+        edit(&s.case().join("fluid/system/controlDict"), "endTime 2.0826;", "endTime 0.00712;");
+        let set = [
+            "run.dem_ranks=2",
+            "run.cfd_ranks=2",
+            "forces.history=true",
+            "forces.torque=true",
+            "forces.added_mass=felderhof",
+            "forces.lift=saffman-mei",
+            "dem.coarse_graining={ 1 = 1.5 }",
+            "smooth.by_diameter=[[2e-4, 4e-4]]",
+            "smooth.largest_cell=1e-3",
+        ];
+        let (out, _) = finish(start(&s.case(), &set), Duration::from_secs(120));
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let rows = std::fs::read_to_string(s.case().join("monitor.csv")).unwrap();
+        let mut lines = rows.lines();
+        let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+        let column = |name: &str| names.iter().position(|c| *c == name).unwrap();
+        let rows: Vec<Vec<f64>> =
+            lines.map(|l| l.split(',').map(|x| x.parse().unwrap_or(f64::NAN)).collect()).collect();
+        let worst = |name: &str| rows.iter().map(|r| r[column(name)]).fold(0.0, f64::max);
+        assert!(rows.len() > 15, "{}", rows.len());
+        assert!(
+            worst("action_reaction_error") <= 1e-12 && worst("action_reaction_error") > 0.0,
+            "{}",
+            worst("action_reaction_error")
+        );
+        assert!(worst("solid_volume_error") <= 1e-12);
+    }
+}
+
+/// What LAMMPS alone, without mpirun and coupler, says to an edited script before the first step.
+fn lammps_says(edits: &[(&str, &str)]) -> String {
+    let s = long_case("lmp", "lammps");
+    edits.iter().for_each(|e| edit(&s.case().join("particles.in"), e.0, e.1));
+    let mut c = Command::new("lmp");
+    c.args(["-in", "particles.in", "-log", "none"]).current_dir(s.case()).stdin(Stdio::null());
+    let out = c.env("LD_PRELOAD", root().join("build/lib/libvoidageLammps.so")).output().unwrap();
+    assert!(!out.status.success());
+    String::from_utf8_lossy(&out.stdout).into_owned()
+}
+
+#[test]
+fn wrong_lammps_scripts_are_refused_with_what_to_type() {
+    let fix = "fix             voidage all voidage";
+    let table: [(&[(&str, &str)], &str); 6] = [
+        (
+            &[
+                ("atom_style      sphere", "atom_style atomic"),
+                ("\"set group all diameter 1e-4 density 3000\"", "\"mass 1 1\""),
+                ("nve/sphere", "nve"),
+            ],
+            "has no radius, mass and angular velocity per particle; type: atom_style sphere",
+        ),
+        (
+            &[("atom_modify     map array", "atom_modify id no"), ("vz[1]", "1"), ("z[1]", "1")],
+            "the particles have no numbers; leave `atom_modify id no` out",
+        ),
+        (
+            &[("timestep        1e-5", "timestep 1e-5\nrun_style respa 1")],
+            "run_style respa does not call it in every step; type: run_style verlet",
+        ),
+        (&[(fix, "group some id 1\nfix voidage some voidage")], "type: fix ID all voidage"),
+        (&[(fix, "fix voidage all voidage\nfix more all voidage")], "there are two of them; keep one"),
+        (&[(fix, fix)], "start it by `voidage run CASE`"),
     ];
-    let (out, _) = finish(start(&s.case(), &set), Duration::from_secs(120));
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-    let rows = std::fs::read_to_string(s.case().join("monitor.csv")).unwrap();
-    let mut lines = rows.lines();
-    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let column = |name: &str| names.iter().position(|c| *c == name).unwrap();
-    let rows: Vec<Vec<f64>> =
-        lines.map(|l| l.split(',').map(|x| x.parse().unwrap_or(f64::NAN)).collect()).collect();
-    let worst = |name: &str| rows.iter().map(|r| r[column(name)]).fold(0.0, f64::max);
-    assert!(rows.len() > 15, "{}", rows.len());
-    assert!(
-        worst("action_reaction_error") <= 1e-12 && worst("action_reaction_error") > 0.0,
-        "{}",
-        worst("action_reaction_error")
-    );
-    assert!(worst("solid_volume_error") <= 1e-12);
+    for (edits, says) in table {
+        let text = lammps_says(edits);
+        assert!(text.contains(says), "{says}: {text}");
+    }
+    // what `voidage check` cannot see, for it reads no file of `include` and no computed variable
+    for (old, new, says) in [
+        (
+            "timestep        1e-5",
+            "variable dt equal 1e-5*2\ntimestep ${dt}",
+            "LAMMPS 29 Sep 2021 runs with a time step of 2e-5 s, dem.time_step is 1e-5 s: make them equal",
+        ),
+        ("units           si", "include units.in", "units cgs; the coupling works in SI; type: units si"),
+    ] {
+        let s = long_case("l-run", "lammps");
+        edit(&s.case().join("particles.in"), old, new);
+        std::fs::write(s.case().join("units.in"), "units cgs\n").unwrap();
+        let (out, _) = finish(start(&s.case(), &[]), Duration::from_secs(60));
+        let text = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.code() == Some(1) && text.contains(says), "{text}");
+    }
+}
+
+#[test]
+fn a_particle_program_that_is_not_installed_is_named() {
+    let s = long_case("absent", "lammps");
+    let mut c = voidage();
+    let out = c.arg("run").arg(s.case()).env("PATH", s.case()).output().unwrap();
+    let text = String::from_utf8_lossy(&out.stderr).into_owned();
+    let says = "dem.program = \"lammps\": LAMMPS is not set up (lmp is not on the PATH); type ./setup lammps";
+    assert!(out.status.code() == Some(1) && text.contains(says), "{text}");
+}
+
+#[test]
+fn lammps_and_liggghts_couple_alike_to_the_last_digit() {
+    // one sphere without contacts: all that moves it is the fix and velocity Verlet, on any number of ranks
+    let rows = |program: &str, ranks: &str| {
+        let s = Scratch::new(&format!("alike-{program}-{ranks}"));
+        copy_case("settling", &s.case(), program);
+        edit(&s.case().join("fluid/system/controlDict"), "endTime 0.24;", "endTime 0.02;");
+        let dem = format!("run.dem_ranks={ranks}");
+        let (out, _) = finish(start(&s.case(), &[&dem]), Duration::from_secs(60));
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let text = std::fs::read_to_string(s.case().join("monitor.csv")).unwrap();
+        let mut lines = text.lines().map(|l| l.split(',').map(str::to_owned).collect::<Vec<_>>());
+        let names = lines.next().unwrap();
+        let kept = |i: &usize| names[*i] == "time_s" || !names[*i].ends_with("_s");
+        let of = |l: Vec<String>| (0..names.len()).filter(kept).map(|i| l[i].clone()).collect::<Vec<_>>();
+        (lines.map(of).collect::<Vec<_>>(), printed(&s.case(), "terminal velocity"))
+    };
+    let (liggghts, lammps) = (rows("liggghts", "1"), rows("lammps", "1"));
+    assert!(liggghts.0.len() == 101 && liggghts.1 > 0.05, "{} rows, {} m/s", liggghts.0.len(), liggghts.1);
+    assert_eq!(liggghts, lammps);
+    assert_eq!(lammps, rows("lammps", "2"));
 }

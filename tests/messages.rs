@@ -33,6 +33,7 @@ fn check(name: &str, case: &str, edits: &[Edit], set: &[&str]) -> (i32, String) 
     (out.status.code().unwrap(), String::from_utf8_lossy(&out.stderr).into_owned())
 }
 
+const LAMMPS: [&str; 2] = ["dem.program=lammps", "dem.script=lammps.in"];
 const SETTLING: &str = "settling";
 const BED: &str = "fluidised-bed";
 const CONTROL: &str = "fluid/system/controlDict";
@@ -40,8 +41,10 @@ const CONTROL: &str = "fluid/system/controlDict";
 #[test]
 fn the_cases_are_without_errors() {
     for case in [SETTLING, BED, "periodic-box"] {
-        let (code, text) = check(&format!("good-{case}"), case, &[], &[]);
-        assert!(code == 0 && !text.contains("error:"), "{case}: {text}");
+        for set in [&[][..], &LAMMPS] {
+            let (code, text) = check(&format!("good-{case}"), case, &[], set);
+            assert!(code == 0 && !text.contains("error:"), "{case} {set:?}: {text}");
+        }
     }
 }
 
@@ -252,6 +255,52 @@ fn errors() {
             &[],
             &["forces.history=true", "fluid.density=1000.0"],
             &["forces.history = true", "by 1.51 of it", "a fluid step of at most 2.2e-5 s"],
+        ),
+        (
+            SETTLING,
+            &[],
+            &["dem.program=lamps"],
+            &["dem.program = \"lamps\"", "accepted: liggghts, lammps", "dem.program = \"lammps\"?"],
+        ),
+        (
+            SETTLING,
+            &[],
+            &["dem.program=lammps"],
+            &[
+                "atom_style = granular: in LAMMPS",
+                "atom_style sphere",
+                "communicate: a command of LIGGGHTS, dem.program is \"lammps\"; in the script: comm_modify vel yes",
+                "pair_style gran:",
+                "fix property/global:",
+            ],
+        ),
+        (
+            SETTLING,
+            &[],
+            &["dem.script=lammps.in"],
+            &["comm_modify: a command of LAMMPS, dem.program is \"liggghts\"", "communicate single vel yes"],
+        ),
+        (SETTLING, &[], &["dem.program=lammps", "dem.script=no.in"], &["no.in", "to the LAMMPS script"]),
+        (
+            SETTLING,
+            &[
+                ("lammps.in", "timestep        1e-5", "timestep 2e-5"),
+                ("lammps.in", "units           si", "units lj"),
+            ],
+            &LAMMPS,
+            &["dem.time_step = 0.00001: the script has timestep 0.00002", "units = lj", "units si"],
+        ),
+        (
+            SETTLING,
+            &[("lammps.in", "fix             voidage all voidage", "")],
+            &LAMMPS,
+            &["no `fix ... voidage`", "add: fix voidage all voidage"],
+        ),
+        (
+            "periodic-box",
+            &[("lammps.in", "block 0 0.002605", "block 0 0.003")],
+            &LAMMPS,
+            &["DEM box in x", "equal in periodic directions"],
         ),
         (SETTLING, &[], &["fluid.case=nowhere"], &["fluid.case = nowhere", "controlDict"]),
     ];

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::folder::{copy, root};
+use common::folder::{PROGRAMS, copy, copy_case, root};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -20,10 +20,13 @@ impl Drop for Case {
 
 impl Case {
     fn new(name: &str, part: &str, end: f64) -> Self {
-        let c =
-            Self(std::env::temp_dir().join(format!("voidage-restart-{name}-{part}-{}", std::process::id())));
+        Self::of("liggghts", name, part, end)
+    }
+    fn of(program: &str, name: &str, part: &str, end: f64) -> Self {
+        let folder = format!("voidage-restart-{program}-{name}-{part}-{}", std::process::id());
+        let c = Self(std::env::temp_dir().join(folder));
         let _ = std::fs::remove_dir_all(&c.0);
-        copy(&root().join("cases").join(name), &c.0);
+        copy_case(name, &c.0, program);
         let _ = std::fs::remove_dir_all(c.0.join("fluid/constant/polyMesh"));
         c.entry("endTime", &end.to_string());
         c.entry("writeFormat", "binary");
@@ -78,10 +81,10 @@ impl Case {
 }
 
 /// Runs 0 → 2 T in one and in two parts; the two cases.
-fn both(name: &str, half: f64, options: &[&str]) -> (Case, Case) {
+fn both(program: &str, name: &str, half: f64, options: &[&str]) -> (Case, Case) {
     let tag = format!("{}", options.len());
-    let (one, two) =
-        (Case::new(name, &format!("one{tag}"), 2.0 * half), Case::new(name, &format!("two{tag}"), half));
+    let part = |part: &str, end: f64| Case::of(program, name, &format!("{part}{tag}"), end);
+    let (one, two) = (part("one", 2.0 * half), part("two", half));
     for c in [&one, &two] {
         c.entry("writeInterval", &half.to_string());
     }
@@ -237,41 +240,47 @@ fn a_stock_solver_that_begins_elsewhere_or_is_not_coupled_is_told_at_once() {
 
 #[test]
 fn one_particle_in_two_parts_is_the_same_to_the_bit() {
-    let (one, two) = both("settling", 0.02, &[]);
-    assert_eq!(one.rows(), two.rows());
-    let ((a, x), (b, y)) = (one.newest(), two.newest());
-    assert_eq!((a.voidage, a.velocity, a.particles_sum), (b.voidage, b.velocity, b.particles_sum));
-    // position included: the particle's row of LIGGGHTS' file
-    assert_eq!(
-        std::fs::read(x.join("particles")).unwrap().len(),
-        std::fs::read(y.join("particles")).unwrap().len()
-    );
+    for program in PROGRAMS {
+        let (one, two) = both(program, "settling", 0.02, &[]);
+        assert_eq!(one.rows(), two.rows());
+        let ((a, x), (b, y)) = (one.newest(), two.newest());
+        assert_eq!((a.voidage, a.velocity, a.particles_sum), (b.voidage, b.velocity, b.particles_sum));
+        // position included: the particle's row of the DEM's file
+        assert_eq!(
+            std::fs::read(x.join("particles")).unwrap().len(),
+            std::fs::read(y.join("particles")).unwrap().len()
+        );
+    }
 }
 
 #[test]
 fn a_bed_with_contacts_goes_on_without_a_jump_on_two_ranks_each() {
-    let half = 0.004;
-    let (one, two) = both("fluidised-bed", half, &["--set", "run.dem_ranks=2", "--set", "run.cfd_ranks=2"]);
-    let (a, b) = (one.rows(), two.rows());
-    let first = (half / 2e-4_f64).round() as i64;
-    let size =
-        |r: &BTreeMap<String, f64>| ["given_x", "given_y", "given_z"].map(|c| r[c].abs()).iter().sum::<f64>();
-    // before: nothing differs; the first steps after: rounding (neighbour lists are in another order); later a
-    // bed of grains amplifies it, so only the first twenty steps are compared
-    for k in 1..=first + 20 {
-        let (x, y) = (&a[&k], &b[&k]);
-        let limit = if k <= first { 0.0 } else { 1e-9 };
-        for c in ["given_x", "given_y", "given_z"] {
-            assert!((x[c] - y[c]).abs() <= limit * size(x), "{c} of exchange {k}: {} and {}", x[c], y[c]);
+    for program in PROGRAMS {
+        let half = 0.004;
+        let (one, two) =
+            both(program, "fluidised-bed", half, &["--set", "run.dem_ranks=2", "--set", "run.cfd_ranks=2"]);
+        let (a, b) = (one.rows(), two.rows());
+        let first = (half / 2e-4_f64).round() as i64;
+        let size = |r: &BTreeMap<String, f64>| {
+            ["given_x", "given_y", "given_z"].map(|c| r[c].abs()).iter().sum::<f64>()
+        };
+        // before: nothing differs; the first steps after: rounding (neighbour lists are in another order); later a
+        // bed of grains amplifies it, so only the first twenty steps are compared
+        for k in 1..=first + 20 {
+            let (x, y) = (&a[&k], &b[&k]);
+            let limit = if k <= first { 0.0 } else { 1e-9 };
+            for c in ["given_x", "given_y", "given_z"] {
+                assert!((x[c] - y[c]).abs() <= limit * size(x), "{c} of exchange {k}: {} and {}", x[c], y[c]);
+            }
+            assert!(
+                (x["ledger_momentum"] - y["ledger_momentum"]).abs() <= 1e-6 * x["ledger_momentum"],
+                "exchange {k}"
+            );
         }
-        assert!(
-            (x["ledger_momentum"] - y["ledger_momentum"]).abs() <= 1e-6 * x["ledger_momentum"],
-            "exchange {k}"
-        );
+        let (a, b) = (one.newest().0, two.newest().0);
+        let gap = a.voidage.iter().zip(&b.voidage).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+        assert!(gap < 1e-9, "voidage differs by {gap}");
     }
-    let (a, b) = (one.newest().0, two.newest().0);
-    let gap = a.voidage.iter().zip(&b.voidage).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
-    assert!(gap < 1e-9, "voidage differs by {gap}");
 }
 
 #[test]
@@ -352,29 +361,31 @@ fn a_killed_run_goes_on_from_its_newest_set() {
 
 #[test]
 fn what_forces_keep_with_the_particles_comes_back() {
-    for (tag, force) in [("history", "forces.history=true"), ("torque", "forces.torque=true")] {
-        // the name of the folder goes by the number of options
-        let more: &[&str] = if tag == "history" { &[] } else { &["--set", "smooth.largest_cell=1.0"] };
-        let (one, two) = both("settling", 0.02, &[&["--set", force], more].concat());
-        assert_eq!(one.rows(), two.rows(), "{tag}");
-        let ((a, x), (b, y)) = (one.newest(), two.newest());
-        assert_eq!(
-            (a.voidage, a.velocity, a.particles_sum),
-            (b.voidage, b.velocity, b.particles_sum),
-            "{tag}"
-        );
-        // the table of the fix, bit by bit, but for the times in the head of the file
-        let read = |f: &Path| std::fs::read(f.join("particles")).unwrap();
-        let (x, y) = (read(&x), read(&y));
-        assert_eq!(x.len(), y.len());
-        assert!(x[x.len() - 280..] == y[y.len() - 280..], "{tag}");
-        if tag == "history" {
-            two.entry("endTime", "0.06");
-            two.refused(
-                &["--set", "forces.history=false"],
-                2,
-                &["keep 34 numbers for the history force", "start anew"],
+    for program in PROGRAMS {
+        for (tag, force) in [("history", "forces.history=true"), ("torque", "forces.torque=true")] {
+            // the name of the folder goes by the number of options
+            let more: &[&str] = if tag == "history" { &[] } else { &["--set", "smooth.largest_cell=1.0"] };
+            let (one, two) = both(program, "settling", 0.02, &[&["--set", force], more].concat());
+            assert_eq!(one.rows(), two.rows(), "{tag}");
+            let ((a, x), (b, y)) = (one.newest(), two.newest());
+            assert_eq!(
+                (a.voidage, a.velocity, a.particles_sum),
+                (b.voidage, b.velocity, b.particles_sum),
+                "{tag}"
             );
+            // the table of the fix, bit by bit, but for the times in the head of the file
+            let read = |f: &Path| std::fs::read(f.join("particles")).unwrap();
+            let (x, y) = (read(&x), read(&y));
+            assert_eq!(x.len(), y.len());
+            assert!(x[x.len() - 280..] == y[y.len() - 280..], "{tag}");
+            if tag == "history" {
+                two.entry("endTime", "0.06");
+                two.refused(
+                    &["--set", "forces.history=false"],
+                    2,
+                    &["keep 34 numbers for the history force", "start anew"],
+                );
+            }
         }
     }
 }

@@ -356,6 +356,21 @@ fn dem(c: &Config, s: &script::Script, p: &mut Vec<Problem>) {
         let accepted = format!("a command of {}, dem.program is \"{}\"", program.other().title, program.name);
         p.push(Problem::error("dem.script", command, &accepted, format!("in the script: {instead}")));
     }
+    for style in s.commands.iter().filter_map(|c| c.strip_prefix("atom_style ")) {
+        if !program.atom_styles.contains(&style) {
+            let accepted = format!(
+                "in {} the coupling needs spheres with radius, mass and angular velocity: {}",
+                program.title,
+                program.atom_styles.join(", ")
+            );
+            p.push(Problem::error(
+                "atom_style",
+                style,
+                &accepted,
+                format!("in the script: atom_style {}", program.atom_styles[0]),
+            ));
+        }
+    }
     if !s.has_fix {
         let accepted = "the script has no `fix ... voidage`: nothing would be coupled";
         p.push(Problem::error(

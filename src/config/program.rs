@@ -14,6 +14,8 @@ pub struct Program {
     pub library: &'static str,
     /// what to type where it is not installed
     pub setup: &'static str,
+    /// atom styles that have what the fix needs, the usual one first
+    pub atom_styles: &'static [&'static str],
     /// commands it does not know because they are the other's, and what to type instead; `/` at the end: all styles below
     pub foreign: &'static [(&'static str, &'static str)],
 }
@@ -26,6 +28,7 @@ pub const PROGRAMS: [Program; 2] = [
         executable: "liggghts",
         library: "libvoidageLiggghts.so",
         setup: "./setup build",
+        atom_styles: &["granular", "sphere", "hybrid"],
         foreign: &[
             ("comm_modify", "communicate single vel yes"),
             ("pair_style granular", "pair_style gran model hertz tangential history"),
@@ -37,8 +40,8 @@ pub const PROGRAMS: [Program; 2] = [
         executable: "lmp",
         library: "libvoidageLammps.so",
         setup: "./setup lammps",
+        atom_styles: &["sphere", "hybrid"],
         foreign: &[
-            ("atom_style granular", "atom_style sphere"),
             ("communicate", "comm_modify vel yes"),
             ("pair_style gran", "pair_style granular, the material in pair_coeff"),
             ("fix property/global", "the material in pair_coeff"),

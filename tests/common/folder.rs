@@ -21,6 +21,25 @@ pub fn copy(from: &Path, to: &Path) {
     }
 }
 
+/// What `dem.program` may name.
+pub const PROGRAMS: [&str; 2] = ["liggghts", "lammps"];
+
+/// Copies a case, to be run with a particle program: LAMMPS' script takes the place of `particles.in`.
+pub fn copy_case(name: &str, to: &Path, program: &str) {
+    copy(&root().join("cases").join(name), to);
+    let (lammps, toml) = (to.join("lammps.in"), to.join("case.toml"));
+    if program == "lammps" {
+        assert!(
+            root().join("build/lib/libvoidageLammps.so").exists(),
+            "the LAMMPS side is not built: type ./setup lammps"
+        );
+        std::fs::rename(lammps, to.join("particles.in")).unwrap();
+        let text = std::fs::read_to_string(&toml).unwrap();
+        assert!(text.contains("[dem]\n"));
+        std::fs::write(toml, text.replace("[dem]\n", "[dem]\nprogram = \"lammps\"\n")).unwrap();
+    }
+}
+
 /// A scratch folder, removed at the end.
 pub struct Folder(PathBuf);
 impl Folder {
