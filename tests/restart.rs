@@ -284,6 +284,22 @@ fn a_bed_with_contacts_goes_on_without_a_jump_on_two_ranks_each() {
 }
 
 #[test]
+fn particles_on_their_way_out_of_a_periodic_box_come_back() {
+    // between two rebuilds of the neighbour lists they stand outside; a restart file takes them to the other side
+    for program in PROGRAMS {
+        let (one, two) = both(program, "periodic-box", 0.01068, &["--set", "run.dem_ranks=2"]);
+        let (a, b) = (one.rows(), two.rows());
+        let last = *a.keys().last().unwrap();
+        assert_eq!((last, a[&last]["particles"], b[&last]["particles"]), (60, 2000.0, 2000.0), "{program}");
+        let size = a.values().map(|r| r["given_z"].abs()).fold(0.0, f64::max);
+        for c in ["given_x", "given_y", "given_z"] {
+            let gap = a.iter().map(|(k, r)| (r[c] - b[k][c]).abs()).fold(0.0, f64::max);
+            assert!(gap <= 1e-9 * size, "{program}: {c} differs by {gap:e} of {size:e}");
+        }
+    }
+}
+
+#[test]
 fn sets_that_do_not_match_are_refused() {
     let c = Case::new("settling", "refused", 0.004);
     c.entry("writeInterval", "0.002");

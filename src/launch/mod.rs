@@ -116,8 +116,7 @@ pub fn run(config: &Config, from: Option<&Restart>, stop: &AtomicBool) -> Result
         }
     }
     std::fs::create_dir_all(&logs).map_err(|e| format!("{}: {e}", logs.display()))?;
-    restart::forget(&config.folder, from.map(|r| r.state.time))
-        .map_err(|e| format!("old restart sets: {e}"))?;
+    restart::forget(&config.folder, from).map_err(|e| format!("old restart sets: {e}"))?;
     let _ = std::fs::remove_file(own_log(config, &logs)); // an old one must not explain a new failure
     for token in voidage_shm::janitor::clean_dead().map_err(|e| e.to_string())? {
         tracing::info!("removed what the dead run {token} left behind");

@@ -132,10 +132,14 @@ fn mismatches(c: &Config, r: &Restart) -> Vec<Problem> {
 }
 
 /// Clears what a later restart could mistake for its own: all sets at a fresh start, later ones at a restart.
-pub fn forget(case: &Path, after: Option<f64>) -> std::io::Result<()> {
-    match after {
+pub fn forget(case: &Path, from: Option<&Restart>) -> std::io::Result<()> {
+    match from {
         None if folder(case).exists() => std::fs::remove_dir_all(folder(case)),
         None => Ok(()),
-        Some(t) => sets(case).into_iter().filter(|s| s.0 > t).try_for_each(|s| std::fs::remove_dir_all(s.1)),
+        // the name of the set itself may be rounded up
+        Some(r) => sets(case)
+            .into_iter()
+            .filter(|s| s.0 > r.state.time && s.1 != r.folder)
+            .try_for_each(|s| std::fs::remove_dir_all(s.1)),
     }
 }
