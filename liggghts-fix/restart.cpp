@@ -10,13 +10,76 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "domain.h"
 #include "update.h"
 
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <string>
+#include <type_traits>
+#include <vector>
 
 using namespace LAMMPS_NS;
+
+namespace {
+
+// The programs write on steps on which they rebuild neighbours: then all atoms are in the box, and `read_restart` takes no
+// others. This writes on any step, so for the file alone atoms outside are put to the other side (periodic), onto the side
+// (fixed), or the side goes out to them (shrink-wrapped); the neighbours of the run go by where they were.
+class InBox {
+ public:
+  InBox(Atom *atom, Domain *domain, MPI_Comm world) : atom_(atom), domain_(domain)
+  {
+    const int n = atom->nlocal;
+    for (int i = 0; i < n; i++) {
+      x_.insert(x_.end(), atom->x[i], atom->x[i] + 3);
+      image_.push_back(atom->image[i]);
+    }
+    if (domain->triclinic) domain->x2lamda(n);
+    domain->pbc();
+    if (domain->triclinic) domain->lamda2x(n);
+    for (int k = 0; k < 3; k++) {
+      low_[k] = domain->boxlo[k];
+      high_[k] = domain->boxhi[k];
+      if (domain->boundary[k][0] == 0 || domain->triclinic) continue;
+      double ends[2] = {low_[k], -high_[k]};  // lowest, -highest
+      for (int i = 0; i < n; i++) {
+        double &x = atom->x[i][k];
+        // 1: fixed; the upper side is no part of the box
+        if (domain->boundary[k][0] == 1) x = fmax(x, low_[k]);
+        if (domain->boundary[k][1] == 1) x = fmin(x, nextafter(high_[k], low_[k]));
+        ends[0] = fmin(ends[0], x);
+        ends[1] = fmin(ends[1], -nextafter(x, HUGE_VAL));
+      }
+      MPI_Allreduce(MPI_IN_PLACE, ends, 2, MPI_DOUBLE, MPI_MIN, world);
+      domain->boxlo[k] = ends[0];
+      domain->boxhi[k] = -ends[1];
+    }
+  }
+
+  ~InBox()
+  {
+    for (int k = 0; k < 3; k++) {
+      domain_->boxlo[k] = low_[k];
+      domain_->boxhi[k] = high_[k];
+    }
+    for (int i = 0; i < atom_->nlocal; i++) {
+      for (int k = 0; k < 3; k++) atom_->x[i][k] = x_[3 * i + k];
+      atom_->image[i] = image_[i];
+    }
+  }
+
+ private:
+  typedef std::remove_pointer<decltype(Atom::image)>::type Image;
+  Atom *atom_;
+  Domain *domain_;
+  std::vector<double> x_;
+  std::vector<Image> image_;
+  double low_[3], high_[3];
+};
+
+}  // namespace
 
 // State of the fix: columns of the table, number of the last exchange, columns of the coupler's memory.
 void FixVoidage::write_restart(FILE *fp)
@@ -91,7 +154,10 @@ void FixVoidage::save()
 {
   if (restart_file_.empty()) return;
   const std::string part = restart_file_ + ".part";
-  host::write_restart(lmp, part);
+  {
+    InBox moved(atom, domain, world);
+    host::write_restart(lmp, part);
+  }
   MPI_Barrier(world);
   if (comm->me == 0 && rename(part.c_str(), restart_file_.c_str()) != 0)
     stop(("the restart file " + restart_file_ + " could not be written; is the disk full?").c_str());
