@@ -4,6 +4,7 @@
 #include "IOdictionary.H"
 #include "dimensionedScalar.H"
 
+#include <cstdio>
 #include <memory>
 
 using namespace Foam;
@@ -105,6 +106,15 @@ static void put(voidage_link* link, unsigned field, const vectorField& values)
 
 void Link::sendFields(const State& s)
 {
+    // controlDict is read again when it changes, and function objects may set the step
+    const scalar dt = mesh_.time().deltaTValue(), wanted = setting("fluid.time_step");
+    if (mag(dt - wanted) > 1e-9*wanted)
+    {
+        char text[200];
+        std::snprintf(text, sizeof text, "deltaT became %g s during the run; the coupling has steps of %g s: make controlDict's "
+            "deltaT that again and continue with --restart", dt, wanted);
+        giveUp(text);
+    }
     ++exchange_;
     const uint64_t n = mesh_.nCells();
     voidage_block blocks[5];
