@@ -6,6 +6,7 @@
 
 #include "atom.h"
 #include "comm.h"
+#include "domain.h"
 #include "update.h"
 
 #include <cmath>
@@ -94,10 +95,13 @@ void FixVoidage::send(bool settle)
     if (memory) memcpy(memory + memory_ * i, a + COLUMNS, memory_ * sizeof(double));
     r[i] = atom->radius[i];
     m[i] = atom->rmass[i];
+    // particles are moved back into a periodic box only when neighbour lists are built
+    double inside[3] = {atom->x[i][0], atom->x[i][1], atom->x[i][2]};
+    domain->remap(inside);
     for (int k = 0; k < 3; k++) {
       // the fluid was given `charged` and the old ledger in full: what it still misses is taken - charged
       if (settle) a[LEDGER + k] = a[TAKEN + k] - a[CHARGED + k];
-      x[3 * i + k] = atom->x[i][k];
+      x[3 * i + k] = inside[k];
       v[3 * i + k] = atom->v[i][k];
       if (w) w[3 * i + k] = atom->omega[i][k];
       taken[3 * i + k] = a[TAKEN + k];

@@ -18,6 +18,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <string>
 
@@ -27,7 +28,7 @@ using namespace FixConst;
 FixVoidage::FixVoidage(LAMMPS *lmp, int narg, char **arg)
   : Fix(lmp, narg, arg), link_(NULL), a_(NULL), width_(COLUMNS), memory_(0), rows_(0), first_step_(-1), exchange_(0),
     restored_(-1), last_(false), interval_(1), explicit_limit_(0.2), added_(0.0), history_(false), types_(false),
-    spins_(false), added_sent_(false), rotation_(false), constant_force_(false), ended_(false), quit_(false), integrated_(0), frozen_(0)
+    spins_(false), added_sent_(false), rotation_(false), constant_force_(false), ended_(false), quit_(false), runs_after_(0), integrated_(0), frozen_(0)
 {
   check_host();
   if (narg != 3 || strcmp(arg[1], "all") != 0)
@@ -57,6 +58,12 @@ FixVoidage::~FixVoidage()
   atom->delete_callback(id, 0);
   atom->delete_callback(id, 1);
   memory->destroy(a_);
+  if (link_) {
+    char text[200];
+    snprintf(text, sizeof text, "the script ended or removed the fix at step " BIGINT_FORMAT ", before the fluid's endTime; "
+             "make its last run longer, type: run 1000000000", update->ntimestep);
+    voidage_fail(link_, text);
+  }
   voidage_close(link_);
 }
 
@@ -99,7 +106,7 @@ void FixVoidage::setup(int vflag)
       for (int i = 0; i < atom->nlocal; i++) set_arrays(i);
     exchange();
   }
-  if (ended_) return;
+  if (ended_) return run_after_end();
   // f was cleared and computed anew for this run; v is at a full step, so a half kick follows
   double **f = atom->f;
   for (int i = 0; i < atom->nlocal; i++) {
@@ -111,6 +118,20 @@ void FixVoidage::setup(int vflag)
     fluid_torque(i, 0.5 * update->dt, fd);
     for (int k = 0; k < 3; k++) atom->torque[i][k] += a_[i][TORQUE + k] = fd[k];
   }
+}
+
+// Without a fluid a later `run` would go on for its 1000000000 steps: it ends after one. A loop of runs (`run N every`,
+// `jump`) would begin the next for ever: the program ends well.
+void FixVoidage::run_after_end()
+{
+  host::end_run(lmp);
+  quit_ = true;
+  if (runs_after_++ < 100) return;
+  const char *text = "fix voidage: a hundred runs since the end of the coupled run; the script ends here\n";
+  if (comm->me == 0 && screen) fputs(text, screen);
+  if (comm->me == 0 && logfile) fputs(text, logfile);
+  MPI_Finalize();
+  exit(0);
 }
 
 bool FixVoidage::moves(int i) const { return (atom->mask[i] & integrated_) && !(atom->mask[i] & frozen_); }

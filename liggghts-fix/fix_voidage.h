@@ -66,6 +66,7 @@ class FixVoidage : public Fix {
   bool constant_force_;        // force of the exchange held over the interval
   bool ended_;                 // the coupler has ended the run: no fluid force any more
   bool quit_;                  // this `run` is being ended
+  int runs_after_;             // `run`s begun after the end
   int integrated_, frozen_;    // group bits
   double totals_[9];           // this rank: impulse taken, charged, old ledger (N s)
 
@@ -78,6 +79,7 @@ class FixVoidage : public Fix {
   void send_history();
   void receive();
   void resume(bigint first);
+  void run_after_end();
   void save();
   void fluid_force(int i, double h, double *fd) const;
   void fluid_torque(int i, double h, double *td) const;
