@@ -67,7 +67,8 @@ pub fn check(case: &Path, set: &[String]) -> u8 {
         Ok(c) => c,
         Err(code) => return code,
     };
-    let problems = config::check(&config);
+    let mut problems = config::check(&config);
+    problems.splice(0..0, config::beginning(&config));
     print(&problems);
     plan.iter().for_each(|p| print!("{p}"));
     record::forecast(&config);
@@ -100,6 +101,10 @@ pub fn run(case: &Path, into: Option<&Path>, set: &[String], restart: Option<Opt
         config.control.start = r.state.origin;
     }
     let mut problems = config::check(&config);
+    if restart.is_none() {
+        let begin = config::beginning(&config).into_iter();
+        problems.splice(0..0, begin.filter(|p| into.is_none() || p.place != "case"));
+    }
     // numbers to judge by are for `check`
     problems.retain(|p| p.severity != Severity::Note);
     print(&problems);

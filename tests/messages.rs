@@ -248,7 +248,34 @@ fn errors() {
             &["forces.added_mass=felderhoff"],
             &["forces.added_mass = \"felderhoff\"", "forces.added_mass = \"felderhof\"?"],
         ),
-        (BED, &[], &["forces.torque=much"], &["invalid type", "expected a boolean"]),
+        (
+            BED,
+            &[],
+            &["forces.torque=much"],
+            &["forces.torque = \"much\"", "invalid type", "expected a boolean"],
+        ),
+        // what newcomers type: each problem with its key, and what to type
+        (
+            BED,
+            &[("case.toml", "density = 1.2", "density = \"1.2\""), ("case.toml", "interval = 20", "")],
+            &["fluid.gravity=-9.81"],
+            &[
+                "fluid.density = \"1.2\"",
+                "expected a number (kg/m3)",
+                "fluid.gravity = -9.81",
+                "e.g. fluid.gravity = [0.0, 0.0, -9.81]",
+                "coupling.interval = nothing: it must be given (DEM steps)",
+                "in [coupling]: interval = 20",
+            ],
+        ),
+        (BED, &[("case.toml", "density = 1.2", "density = 1,2")], &[], &["line 9 (density = 1,2"]),
+        (BED, &[], &["fluid.viscosity=1e-5"], &["did you mean fluid.kinematic_viscosity?"]),
+        (
+            BED,
+            &[("case.toml", "format = 1", "format = 1\ndensity = 1")],
+            &[],
+            &["did you mean fluid.density?"],
+        ),
         // 18/√π 1000/3000 √(1e-5 2e-4)/1e-4
         (
             SETTLING,

@@ -6,6 +6,7 @@ use super::{
     CoarseGraining, Config, Continuity, Feedback, Flow, GravityTreatment, InInterval, Model, Problem,
     bandwidth, foam, script,
 };
+use std::path::Path;
 
 /// All problems of a case, errors first.
 pub fn check(c: &Config) -> Vec<Problem> {
@@ -48,12 +49,76 @@ pub fn check(c: &Config) -> Vec<Problem> {
             "make the mesh first, e.g. blockMesh",
         ));
     }
+    files(c, &mut p);
     pressure_gradient(c, &mut p);
     if let (Some(mesh), Ok(s)) = (foam::extent(&case), &script) {
         meshes(c, &mesh, s, &mut p);
     }
     p.sort_by_key(|x| x.severity);
     p
+}
+
+/// What the OpenFOAM case asks for and would not get, and what it lacks.
+fn files(c: &Config, p: &mut Vec<Problem>) {
+    let (case, ranks) = (c.fluid_case(), c.file.run.cfd_ranks);
+    let place = |file: &str| case.join(file).display().to_string();
+    if let Some(parts) = foam::parts(&case).filter(|n| ranks > 1 && *n != Some(ranks)) {
+        let accepted = format!(
+            "{} has numberOfSubdomains {}",
+            place("system/decomposeParDict"),
+            parts.map_or("missing".into(), |n| n.to_string())
+        );
+        p.push(Problem::error("run.cfd_ranks", ranks, &accepted, "make them equal or remove the file"));
+    }
+    if foam::steady(&case) {
+        let fix = "fvSchemes: ddtSchemes { default Euler; }";
+        p.push(Problem::error("ddtSchemes", "steadyState", "the coupled flow is transient", fix));
+    }
+    if foam::has_patch(&case, "wedge") {
+        let accepted =
+            "the particles move in three dimensions, and a wedge holds only those within its few degrees";
+        p.push(Problem::error(
+            "patch",
+            "wedge",
+            accepted,
+            "mesh the whole vessel, or a plane slice with `empty` patches",
+        ));
+    }
+    if !c.file.fluid.stock() && foam::rotating(&case) {
+        let accepted = "voidageFoam has no rotating frames: they would be ignored";
+        let fix = "remove the file, or (dilute scenes) fluid.solver = \"pimpleFoam\"";
+        p.push(Problem::error(&place("constant/MRFProperties"), "an active zone", accepted, fix));
+    }
+    if let Some(kind) = foam::moving_mesh(&case) {
+        let accepted = "the mesh must not move: the coupler has its own copy, made at the start";
+        p.push(Problem::error("dynamicFvMesh", kind, accepted, "remove constant/dynamicMeshDict"));
+    }
+}
+
+/// What a run that is no restart needs of the folders it begins in.
+pub fn beginning(c: &Config) -> Vec<Problem> {
+    let (case, mut p) = (c.fluid_case(), Vec::new());
+    if let Some(what) = unfit(&c.folder) {
+        p.push(Problem::error("case", c.folder.display(), what, "move or copy the case (--into DIR)"));
+    }
+    let begin = foam::time_folder(&case, c.control.start, 1e-2 * c.control.step);
+    let has = |f: &Path, name: &str| f.join(name).exists() || f.join(format!("{name}.gz")).exists();
+    let missing: Vec<&str> =
+        ["U", "p"].into_iter().filter(|name| !begin.as_deref().is_some_and(|f| has(f, name))).collect();
+    if !missing.is_empty() {
+        let given = format!("no {} of t = {}", missing.join(" and "), c.control.start);
+        let accepted = "controlDict (startFrom, startTime) begins there, with U and p (kinematic, m2/s2)";
+        let fix = if case.join("0.orig").exists() { "cp -r 0.orig 0" } else { "give them, e.g. in 0/" };
+        p.push(Problem::error(&case.display().to_string(), given, accepted, fix));
+    }
+    p
+}
+
+/// Why OpenFOAM and LD_PRELOAD cannot work with a path: OpenFOAM drops such characters and works elsewhere.
+pub fn unfit(path: &Path) -> Option<&'static str> {
+    let text = path.to_string_lossy();
+    text.contains(|c: char| c.is_whitespace() || "\"':".contains(c))
+        .then_some("OpenFOAM takes no path with a blank, quote or colon")
 }
 
 /// Problems of the settings alone, without the files of a case.
@@ -71,8 +136,15 @@ fn values(c: &Config, p: &mut Vec<Problem>) {
     }
     let mut range = |key: &str, value: f64, low: f64, high: f64, unit: &str| {
         if !(value >= low && value <= high) {
-            let accepted = format!("between {low:e} and {high:e} {unit}: are the units right?");
-            p.push(Problem::error(key, value, &accepted, format!("give {key} in {unit}")));
+            let (accepted, fix) = if unit.is_empty() {
+                (format!("between {low:e} and {high:e}"), format!("give {key} in that range"))
+            } else {
+                (
+                    format!("between {low:e} and {high:e} {unit}: are the units right?"),
+                    format!("give {key} in {unit}"),
+                )
+            };
+            p.push(Problem::error(key, value, &accepted, fix));
         }
     };
     range("fluid.density", f.fluid.density, 1e-2, 3e4, "kg/m3");
@@ -450,6 +522,12 @@ fn meshes(c: &Config, mesh: &foam::Extent, s: &script::Script, p: &mut Vec<Probl
         let accepted = format!("the CFD mesh has [{}, {}]", mesh.lower[a], mesh.upper[a]);
         let periodic = s.boundary.as_ref().is_some_and(|b| b[a].starts_with('p'));
         let equal = (lower[a] - mesh.lower[a]).abs() < slack && (upper[a] - mesh.upper[a]).abs() < slack;
+        let fluid = c.fluid_case();
+        if periodic && !["cyclic", "empty"].iter().any(|kind| foam::has_patch(&fluid, kind)) {
+            let accepted = "the mesh has neither cyclic nor empty patches: particles would pass where the fluid is bounded";
+            let fix = "make the patches cyclic, or boundary f in the script";
+            p.push(Problem::warning(&format!("DEM boundary in {axis}"), "p", accepted, fix));
+        }
         if periodic && !equal {
             let fix = "make both boxes equal in periodic directions";
             p.push(Problem::error(&format!("DEM box in {axis}"), given, &accepted, fix));

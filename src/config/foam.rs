@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The few facts of an OpenFOAM case that the checks need. Reads plain dictionaries (no macros, no includes);
-//! what it cannot read is `None`, never a guess.
+//! The few facts of an OpenFOAM case that the checks need. Reads plain dictionaries (macros and includes of controlDict are
+//! put in by OpenFOAM's foamDictionary); what it cannot read is `None`, never a guess.
 
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 /// system/controlDict.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,13 +58,81 @@ fn number(text: &str, key: &str) -> Option<f64> {
 impl Control {
     /// Reads a controlDict; the error says what is missing.
     pub fn read(path: &Path) -> Result<Self, String> {
-        let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-        let need = |key: &str| number(&text, key).ok_or(format!("{} has no number {key}", path.display()));
+        let mut text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        if plain(&text).contains(['$', '#']) {
+            text = expanded(path).unwrap_or(text);
+        }
+        let none =
+            |key: &str| format!("{} has no number {key} (#calc and the like are not read)", path.display());
+        let need = |key: &str| number(&text, key).ok_or(none(key));
         let case = path.ancestors().nth(2).unwrap_or(path);
-        let start = begin(&text, case).ok_or(format!("{} has no number startTime", path.display()))?;
+        let start = begin(&text, case).ok_or(none("startTime"))?;
         let adjustable = entry(&text, "adjustTimeStep").is_some_and(|v| ["yes", "on", "true"].contains(&&*v));
         Ok(Self { start, end: need("endTime")?, step: need("deltaT")?, adjustable })
     }
+}
+
+/// A program of OpenFOAM, which wants to know where its own files are.
+pub fn program(name: &str) -> Command {
+    let mut command = Command::new(name);
+    command.stdin(Stdio::null());
+    if std::env::var_os("WM_PROJECT_DIR").is_none() {
+        command.env("WM_PROJECT_DIR", "/usr/share/openfoam");
+    }
+    command
+}
+
+/// A dictionary with its macros and includes put in.
+fn expanded(path: &Path) -> Option<String> {
+    let out = program("foamDictionary").arg("-expand").arg(path).output().ok()?;
+    out.status.success().then(|| String::from_utf8_lossy(&out.stdout).into_owned())
+}
+
+/// Head of a system/decomposeParDict that is not the user's.
+pub const OURS: &str = "// written by voidage run";
+
+/// numberOfSubdomains of the user's own system/decomposeParDict, if there is one.
+pub fn parts(case: &Path) -> Option<Option<u32>> {
+    let text = std::fs::read_to_string(case.join("system/decomposeParDict")).ok()?;
+    (!text.contains(OURS)).then(|| entry(&text, "numberOfSubdomains").and_then(|n| n.parse().ok()))
+}
+
+/// Has the mesh patches of a kind?
+pub fn has_patch(case: &Path, kind: &str) -> bool {
+    let read = |f: &str| std::fs::read_to_string(case.join(f)).ok();
+    let text = read("constant/polyMesh/boundary").or_else(|| read("system/blockMeshDict"));
+    let words = |t: String| plain(&t).split_whitespace().collect::<String>();
+    text.is_some_and(|t| words(t).contains(&format!("type{kind};")))
+}
+
+/// Does system/fvSchemes leave out the rates of change?
+pub fn steady(case: &Path) -> bool {
+    let text = plain(&std::fs::read_to_string(case.join("system/fvSchemes")).unwrap_or_default());
+    let section = text.split("ddtSchemes").nth(1).and_then(|s| s.split(['{', '}']).nth(1));
+    section.is_some_and(|s| s.contains("steadyState"))
+}
+
+/// Has constant/MRFProperties a zone that is active (the default)?
+pub fn rotating(case: &Path) -> bool {
+    let Ok(text) = std::fs::read_to_string(case.join("constant/MRFProperties")) else { return false };
+    let text = plain(&text);
+    let zones = text.split("cellZone").skip(1);
+    zones
+        .map(|z| entry(z.split('}').next().unwrap_or(z), "active"))
+        .any(|a| a.is_none_or(|a| ["yes", "on", "true"].contains(&&*a)))
+}
+
+/// The kind of mesh of constant/dynamicMeshDict, if it moves.
+pub fn moving_mesh(case: &Path) -> Option<String> {
+    let text = std::fs::read_to_string(case.join("constant/dynamicMeshDict")).ok()?;
+    entry(&text, "dynamicFvMesh").filter(|kind| kind != "staticFvMesh")
+}
+
+/// The folder of a time in an OpenFOAM case.
+pub fn time_folder(case: &Path, time: f64, slack: f64) -> Option<PathBuf> {
+    let entries = std::fs::read_dir(case).ok()?.flatten();
+    let at = |e: &std::fs::DirEntry| e.file_name().to_str().and_then(|n| n.parse::<f64>().ok());
+    entries.into_iter().find(|e| at(e).is_some_and(|t| (t - time).abs() <= slack)).map(|e| e.path())
 }
 
 /// Time (s) a solver begins at by the text of its controlDict, with the time folders in `place`: the case or a processor's part of it.

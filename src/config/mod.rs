@@ -13,7 +13,7 @@ mod raw;
 pub(crate) mod resolution;
 pub mod script;
 
-pub use check::{check, settings};
+pub use check::{beginning, check, settings, unfit};
 pub use raw::*;
 use raw::{Parsed, parse};
 
@@ -131,11 +131,15 @@ pub fn load(folder: &Path, overrides: &[(String, String)]) -> Result<Config, Vec
     })?;
     let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf());
     let control = folder.join(&file.fluid.case).join("system/controlDict");
-    let control = foam::Control::read(&control).map_err(|e| {
-        let fix = "set fluid.case to the OpenFOAM case (folder with system/controlDict)";
+    let read = foam::Control::read(&control).map_err(|e| {
+        let fix = if control.exists() {
+            "controlDict: a number, e.g. deltaT 2e-4;"
+        } else {
+            "set fluid.case to the OpenFOAM case (folder with system/controlDict)"
+        };
         vec![Problem::error("fluid.case", file.fluid.case.display(), &e, fix)]
     })?;
-    let mut config = Config { folder, file, control, given };
+    let mut config = Config { folder, file, control: read, given };
     if wake {
         config.file.smooth.bandwidth = bandwidth::from_wake(&config).map_err(|p| vec![p])?;
     }

@@ -661,7 +661,8 @@ pub(super) struct Parsed {
 pub(super) fn parse(text: &str, overrides: &[(String, String)]) -> Result<Parsed, Vec<Problem>> {
     let syntax = |e: toml::de::Error| {
         let line = e.span().map(|s| text[..s.start.min(text.len())].lines().count().max(1));
-        let given = line.map(|l| format!("line {l}")).unwrap_or_default();
+        let words = |l: usize| text.lines().nth(l - 1).unwrap_or("").trim();
+        let given = line.map(|l| format!("line {l} ({})", words(l))).unwrap_or_default();
         vec![Problem::error("", given, e.message(), "see `voidage explain`")]
     };
     let mut table: toml::Table = toml::from_str(text).map_err(syntax)?;
@@ -674,11 +675,94 @@ pub(super) fn parse(text: &str, overrides: &[(String, String)]) -> Result<Parsed
     }
     let given = table.iter().flat_map(|(section, v)| keys(section, v)).collect();
     let wake = bandwidth_word(&mut table)?;
-    let file = CaseFile::deserialize(table).map_err(|e| {
+    let file = CaseFile::deserialize(table.clone()).map_err(|e| {
+        let found = missing_or_of_another_type(&table);
+        if !found.is_empty() {
+            return found;
+        }
         vec![Problem::error("", "its content", &e.message().replace('\n', " "), "see `voidage explain`")]
     })?;
     let problems = names(&file);
     if problems.is_empty() { Ok(Parsed { file, wake, given }) } else { Err(problems) }
+}
+
+/// Keys that must be given, with an example; together the smallest case file.
+const NEEDED: [(&str, &str); 9] = [
+    ("format", "1"),
+    ("fluid.density", "1.2"),
+    ("fluid.kinematic_viscosity", "1.5e-5"),
+    ("fluid.gravity", "[0.0, 0.0, -9.81]"),
+    ("dem.script", "\"particles.in\""),
+    ("dem.time_step", "1e-5"),
+    ("coupling.interval", "20"),
+    ("smooth.bandwidth", "4.8e-3"),
+    ("forces.drag", "\"gidaspow\""),
+];
+
+fn parsed(value: &str) -> Option<toml::Value> {
+    toml::from_str::<toml::Table>(&format!("x = {value}")).ok()?.remove("x")
+}
+
+fn put(table: &mut toml::Table, key: &str, value: toml::Value) {
+    let (section, name) = key.split_once('.').unwrap_or(("", key));
+    if section.is_empty() {
+        table.insert(name.into(), value);
+    } else if let toml::Value::Table(t) = table.entry(section).or_insert_with(|| toml::Table::new().into()) {
+        t.insert(name.into(), value);
+    }
+}
+
+fn look_up<'a>(table: &'a toml::Table, key: &str) -> Option<&'a toml::Value> {
+    match key.split_once('.') {
+        Some((section, name)) => table.get(section)?.get(name),
+        None => table.get(key),
+    }
+}
+
+/// Why a table is no case file, key by key: each is tried alone in the smallest one.
+fn missing_or_of_another_type(table: &toml::Table) -> Vec<Problem> {
+    let mut smallest = toml::Table::new();
+    NEEDED.iter().filter_map(|(k, v)| Some((k, parsed(v)?))).for_each(|(k, v)| put(&mut smallest, k, v));
+    let method = table.get("smooth").and_then(|s| s.get("method")?.as_str());
+    let mut problems = Vec::new();
+    for (key, unit, default, meaning) in KEYS {
+        let example = NEEDED.iter().find(|n| n.0 == *key).map(|n| n.1.to_string());
+        let unit = if unit.is_empty() { String::new() } else { format!(" ({unit})") };
+        let Some(value) = look_up(table, key) else {
+            if let Some(example) = example.filter(|_| *key != "smooth.bandwidth" || method != Some("none")) {
+                let fix = match key.split_once('.') {
+                    Some((section, name)) => format!("in [{section}]: {name} = {example}"),
+                    None => format!("{key} = {example}"),
+                };
+                problems.push(Problem::error(
+                    key,
+                    "nothing",
+                    &format!("it must be given{unit}: {meaning}"),
+                    fix,
+                ));
+            }
+            continue;
+        };
+        let mut alone = smallest.clone();
+        put(&mut alone, key, value.clone());
+        if let Err(e) = CaseFile::deserialize(alone) {
+            let said = e
+                .message()
+                .replace('\n', " ")
+                .replace(" f64", " a number")
+                .replace(" u32", " a whole number");
+            let default =
+                parsed(default).map_or_else(|| format!("\"{default}\""), |_| (*default).to_string());
+            let fix = format!("{key} = {}", example.unwrap_or(default));
+            problems.push(Problem::error(
+                key,
+                value,
+                &format!("{said}{unit}: {meaning}"),
+                format!("e.g. {fix}"),
+            ));
+        }
+    }
+    problems
 }
 
 /// A word in the place of the bandwidth: "wake", to be replaced by a number later.
@@ -700,8 +784,7 @@ fn bandwidth_word(table: &mut toml::Table) -> Result<bool, Vec<Problem>> {
 }
 
 fn set(table: &mut toml::Table, key: &str, value: &str) -> Result<(), Vec<Problem>> {
-    let parsed = toml::from_str::<toml::Table>(&format!("x = {value}")).ok().and_then(|mut t| t.remove("x"));
-    let value = parsed.unwrap_or_else(|| toml::Value::String(value.into()));
+    let value = parsed(value).unwrap_or_else(|| toml::Value::String(value.into()));
     let bad =
         || vec![Problem::error(key, &value, "overrides are section.key=value", "see `voidage explain`")];
     let (path, last) = key.rsplit_once('.').ok_or_else(bad)?;
@@ -727,7 +810,15 @@ fn unknown_keys(table: &toml::Table) -> Vec<Problem> {
     let known = || KEYS.iter().map(|k| k.0);
     for (section, value) in table {
         for key in keys(section, value).into_iter().filter(|k| !known().any(|n| n == k)) {
-            let fix = match nearest(&key, known()) {
+            // the end of a longer name, as viscosity, is nearer than any other
+            let (section, name) = key.split_once('.').unwrap_or(("", &key));
+            let end = |k: &&str| {
+                k.split_once('.').is_some_and(|k| {
+                    if section.is_empty() { k.1 == name } else { k.0 == section && k.1.ends_with(name) }
+                })
+            };
+            let near = known().find(|k| name.len() > 3 && end(k)).or_else(|| nearest(&key, known()));
+            let fix = match near {
                 Some(n) => format!("did you mean {n}?"),
                 None => "see `voidage explain`".into(),
             };

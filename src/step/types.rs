@@ -54,8 +54,8 @@ pub struct Setup {
 pub enum StepError {
     /// A particle has no host cell.
     #[error(
-        "particle {id} at {position:?} m is outside the mesh{near}: keep the DEM box inside the CFD mesh (`voidage \
-         check`), or set limits.outside = \"exclude\" to leave such particles out"
+        "particle {id} at {position:?} m is outside the mesh{near}: where particles leave (an outlet: LIGGGHTS \
+         removes them a little later) or touch a curved wall the mesh cuts short, set limits.outside = \"exclude\"; else keep the DEM box inside the CFD mesh (`voidage check`)"
     )]
     Outside {
         /// particle id
