@@ -125,7 +125,10 @@ impl Groups {
 
     /// Why the run failed: the coupler's words if it had any, else the end of a log.
     pub fn reason(&self, first: usize, coupler: Option<&str>) -> String {
-        let g = &self.list[first];
+        // whose end the coupler saw; others ended because of it, perhaps sooner
+        let named =
+            |g: &Running| coupler.is_some_and(|w| w.contains(&format!("{} rank", g.name.to_uppercase())));
+        let g = self.list.iter().find(|g| named(g)).unwrap_or(&self.list[first]);
         let how = match g.status {
             Some(s) if s.signal().is_some() => {
                 format!("was killed by signal {}", s.signal().unwrap_or_default())
@@ -147,14 +150,20 @@ impl Groups {
         let tail: String = logs.map(read).collect();
         // "voidage: ", not the "voidage::" of a function's name
         let wanted = |l: &&str| {
-            (l.contains("ERROR") || l.contains("rror:") || l.contains("voidage: ")) && !l.contains("ORTE_")
+            // a line of a stack trace, "#1  Foam::error::abort()", says nothing
+            let traced =
+                l.trim_start_matches(|c: char| "[] ".contains(c) || c.is_ascii_digit()).starts_with('#');
+            !traced
+                && (l.contains("ERROR") || l.contains("rror:") || l.contains("voidage: "))
+                && !l.contains("ORTE_")
         };
         let lines: Vec<&str> = tail.lines().collect();
         if let Some(at) = lines.iter().rposition(wanted) {
             let line = lines[at].trim();
             // OpenFOAM says what it is in the line after
             let more = lines.get(at + 1).filter(|_| line.ends_with("ERROR:"));
-            if !text.contains(line) {
+            let told = coupler.and_then(|w| w.lines().next()).is_some_and(|w| line.contains(w));
+            if !told && !text.contains(line) {
                 text += &format!("\n  {} {how}; its log says: {line}", g.name);
                 text.extend(more.map(|l| format!(" {}", l.trim())));
             }

@@ -7,7 +7,7 @@ pub mod prepare;
 pub mod restart;
 mod ui;
 
-use crate::config::{Config, program::Program};
+use crate::config::{Config, program::Program, unfit};
 use groups::{Group, Groups};
 use restart::Restart;
 use std::path::{Path, PathBuf};
@@ -107,6 +107,11 @@ fn mpirun(ranks: u32, shared: &Path, own: &Path, export: &[&str]) -> Vec<String>
 pub fn run(config: &Config, from: Option<&Restart>, stop: &AtomicBool) -> Result<Outcome, String> {
     let home = companions()?;
     installed(config.program(), &home)?;
+    for path in [&config.folder, &home.libraries] {
+        if let Some(what) = unfit(path) {
+            return Err(format!("{}: {what}; move or copy it (a case: --into DIR)", path.display()));
+        }
+    }
     let logs = config.folder.join("logs");
     if let Some(r) = from.filter(|_| logs.exists()) {
         // the logs of the part before stay

@@ -4,7 +4,6 @@
 use crate::config::{Config, foam};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 /// Copies a case to a folder that must be new or empty; results and logs stay behind.
 pub fn copy(from: &Path, to: &Path) -> Result<(), String> {
@@ -64,16 +63,8 @@ pub fn fluid(config: &Config, logs: &Path) -> Result<(), String> {
 /// system/decomposeParDict for `ranks` parts, if the user has none for that number.
 fn decomposition(case: &Path, ranks: u32) -> Result<(), String> {
     let file = case.join("system/decomposeParDict");
-    if let Ok(text) = fs::read_to_string(&file) {
-        let has = foam::entry(&text, "numberOfSubdomains").and_then(|n| n.parse::<u32>().ok());
-        if has == Some(ranks) {
-            return Ok(());
-        }
-        let has = has.map_or("no number".into(), |n| n.to_string());
-        return Err(format!(
-            "{}: numberOfSubdomains is {has}, run.cfd_ranks is {ranks}; make them equal or remove the file",
-            file.display()
-        ));
+    if foam::parts(case).is_some() {
+        return Ok(()); // the check has compared the numbers
     }
     // cut across the longest side
     let extent = foam::extent(case).map_or([1.0, 0.0, 0.0], |e| [0, 1, 2].map(|a| e.upper[a] - e.lower[a]));
@@ -81,8 +72,9 @@ fn decomposition(case: &Path, ranks: u32) -> Result<(), String> {
     let n = [0, 1, 2].map(|a| if a == longest { ranks.to_string() } else { "1".into() }).join(" ");
     let text = format!(
         "FoamFile {{ version 2.0; format ascii; class dictionary; object decomposeParDict; }}\n\
-         // written by voidage run: cut across the longest side\n\
-         numberOfSubdomains {ranks};\nmethod simple;\nsimpleCoeffs {{ n ({n}); delta 0.001; }}\n"
+         {}: cut across the longest side\n\
+         numberOfSubdomains {ranks};\nmethod simple;\nsimpleCoeffs {{ n ({n}); delta 0.001; }}\n",
+        foam::OURS
     );
     fs::write(&file, text).map_err(|e| format!("{}: {e}", file.display()))
 }
@@ -91,14 +83,25 @@ fn tool(name: &str, case: &Path, logs: &Path, args: &[&str]) -> Result<(), Strin
     let log = logs.join(format!("{name}.log"));
     let file = fs::File::create(&log).map_err(|e| format!("{}: {e}", log.display()))?;
     let twin = file.try_clone().map_err(|e| e.to_string())?;
-    let mut command = Command::new(name);
-    command.arg("-case").arg(case).args(args).stdin(Stdio::null()).stdout(file).stderr(twin);
-    if std::env::var_os("WM_PROJECT_DIR").is_none() {
-        command.env("WM_PROJECT_DIR", "/usr/share/openfoam");
-    }
+    let mut command = foam::program(name);
+    command.arg("-case").arg(case).args(args).stdout(file).stderr(twin);
     match command.status() {
         Ok(s) if s.success() => Ok(()),
-        Ok(s) => Err(format!("{name} failed ({s}): see {}", log.display())),
+        Ok(s) => Err(format!("{name} failed ({s}){}; see {}", complaint(&log), log.display())),
         Err(e) => Err(format!("{name} could not be started: {e}; install OpenFOAM: ./setup build")),
     }
+}
+
+/// What OpenFOAM says in a log behind FATAL.
+fn complaint(log: &Path) -> String {
+    let text = fs::read(log).unwrap_or_default();
+    let text = String::from_utf8_lossy(&text);
+    let Some((_, said)) = text.split_once("FOAM FATAL") else { return String::new() };
+    let said: Vec<&str> = said.lines().skip(1).map(str::trim).take_while(|l| !l.is_empty()).collect();
+    let fix = if said.join(" ").contains("stub library") {
+        "; Debian's OpenFOAM comes without it, in system/decomposeParDict type: method hierarchical (or simple)"
+    } else {
+        ""
+    };
+    format!(": {}{fix}", said.join(" "))
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `voidage run --restart`: finds a set and refuses what does not fit together, before anything starts.
 
-use crate::config::{Config, Problem, foam, script};
+use crate::config::{Config, Problem, foam, foam::time_folder, script};
 use crate::output::restart::{PARTICLES, State, folder, kept, sets};
 use std::path::{Path, PathBuf};
 
@@ -19,13 +19,6 @@ impl Restart {
     pub fn particles(&self) -> PathBuf {
         self.folder.join(PARTICLES)
     }
-}
-
-/// The folder of a time in an OpenFOAM case.
-fn time_folder(case: &Path, time: f64, slack: f64) -> Option<PathBuf> {
-    let entries = std::fs::read_dir(case).ok()?.flatten();
-    let at = |e: &std::fs::DirEntry| e.file_name().to_str().and_then(|n| n.parse::<f64>().ok());
-    entries.into_iter().find(|e| at(e).is_some_and(|t| (t - time).abs() <= slack)).map(|e| e.path())
 }
 
 /// The newest set of a case, or that of `time` (s). All that does not match is an error.

@@ -67,7 +67,7 @@ impl Ui {
         );
         self.bar.set_position(step);
         self.bar.set_message(text.clone());
-        if !self.terminal && (self.said.elapsed() > Duration::from_secs(10) || step >= self.steps) {
+        if !self.terminal && (self.said.elapsed() > Duration::from_secs(10) || step == self.steps) {
             self.said = Instant::now();
             self.say(&format!("step {step} of {}: {text}", self.steps));
         }
