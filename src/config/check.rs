@@ -103,11 +103,13 @@ pub fn beginning(c: &Config) -> Vec<Problem> {
     }
     let begin = foam::time_folder(&case, c.control.start, 1e-2 * c.control.step);
     let has = |f: &Path, name: &str| f.join(name).exists() || f.join(format!("{name}.gz")).exists();
+    // stock solvers have their own names for the pressure
+    let needed: &[&str] = if c.file.fluid.stock() { &["U"] } else { &["U", "p"] };
     let missing: Vec<&str> =
-        ["U", "p"].into_iter().filter(|name| !begin.as_deref().is_some_and(|f| has(f, name))).collect();
+        needed.iter().copied().filter(|name| !begin.as_deref().is_some_and(|f| has(f, name))).collect();
     if !missing.is_empty() {
         let given = format!("no {} of t = {}", missing.join(" and "), c.control.start);
-        let accepted = "controlDict (startFrom, startTime) begins there, with U and p (kinematic, m2/s2)";
+        let accepted = "controlDict (startFrom, startTime) begins there; voidageFoam takes U and the kinematic p (m2/s2)";
         let fix = if case.join("0.orig").exists() { "cp -r 0.orig 0" } else { "give them, e.g. in 0/" };
         p.push(Problem::error(&case.display().to_string(), given, accepted, fix));
     }
