@@ -536,35 +536,39 @@ fn fails(s: &Scratch, set: &[&str], code: i32, says: &[&str]) {
 }
 
 /// The settling case to 4 ms.
-fn short_case(name: &str) -> Scratch {
-    let s = long_case(name);
+fn short_case(name: &str, program: &str) -> Scratch {
+    let s = long_case(name, program);
     edit(&s.case().join("fluid/system/controlDict"), "endTime 40;", "endTime 0.004;");
     s
 }
 
 #[test]
 fn a_script_that_ends_before_the_fluid_is_told_so() {
-    let s = short_case("early");
-    edit(&s.case().join("particles.in"), "run             1000000000", "run 50\nrun 130");
-    fails(&s, &[], 1, &["ended or removed the fix at step 180", "type: run 1000000000", "dem.log"]);
+    for program in ["liggghts", "lammps"] {
+        let s = short_case("early", program);
+        edit(&s.case().join("particles.in"), "run             1000000000", "run 50\nrun 130");
+        fails(&s, &[], 1, &["ended or removed the fix at step 180", "type: run 1000000000", "dem.log"]);
+    }
 }
 
 #[test]
 fn runs_after_the_end_do_not_go_on_for_ever() {
-    let s = short_case("loop");
     // the end falls in the third; two more and a loop of millions are left
     let runs =
         "run 100\nrun 50\nrun 1000000000\nrun 1000000000\nprint \"still here\"\nrun 1000000000 every 10 NULL";
-    edit(&s.case().join("particles.in"), "run             1000000000", runs);
-    let (out, took) = finish(start(&s.case(), &["run.dem_ranks=2"]), Duration::from_secs(60));
-    assert!(out.status.success() && took.as_secs() < 40, "{}", String::from_utf8_lossy(&out.stderr));
-    let log = std::fs::read_to_string(s.case().join("logs/dem.log")).unwrap();
-    assert!(log.contains("still here") && log.contains("the script ends here"), "{log}");
+    for program in ["liggghts", "lammps"] {
+        let s = short_case("loop", program);
+        edit(&s.case().join("particles.in"), "run             1000000000", runs);
+        let (out, took) = finish(start(&s.case(), &["run.dem_ranks=2"]), Duration::from_secs(60));
+        assert!(out.status.success() && took.as_secs() < 40, "{}", String::from_utf8_lossy(&out.stderr));
+        let log = std::fs::read_to_string(s.case().join("logs/dem.log")).unwrap();
+        assert!(log.contains("still here") && log.contains("the script ends here"), "{log}");
+    }
 }
 
 #[test]
 fn macros_and_includes_of_control_dict_are_read() {
-    let s = short_case("macro");
+    let s = short_case("macro", "liggghts");
     let control = s.case().join("fluid/system/controlDict");
     edit(&control, "endTime 0.004;", "#include \"times\"");
     edit(&control, "deltaT 2e-4;", "step 2e-4; deltaT $step;");
@@ -575,7 +579,7 @@ fn macros_and_includes_of_control_dict_are_read() {
 
 #[test]
 fn a_fluid_step_that_changes_during_the_run_ends_it() {
-    let s = long_case("step");
+    let s = long_case("step", "liggghts");
     let control = s.case().join("fluid/system/controlDict");
     // else OpenFOAM overlooks changes of the first ten seconds
     let now = "OptimisationSwitches { fileModificationSkew 0; }\nrunTimeModifiable yes;\napplication";
@@ -594,7 +598,7 @@ fn what_a_fluid_case_asks_for_in_vain_is_refused() {
     let head = |object: &str| {
         format!("FoamFile {{ version 2.0; format ascii; class dictionary; object {object}; }}\n")
     };
-    let s = short_case("vain");
+    let s = short_case("vain", "liggghts");
     let file = |name: &str, text: &str| {
         std::fs::write(s.case().join("fluid").join(name), head("x") + text).unwrap();
     };
@@ -618,21 +622,21 @@ fn what_a_fluid_case_asks_for_in_vain_is_refused() {
     file("system/decomposeParDict", "numberOfSubdomains 2; method scotch;");
     fails(&s, &["run.cfd_ranks=2"], 1, &["decomposePar failed", "<scotch>", "method hierarchical"]);
     let s = Scratch::new("wed ge");
-    copy(&root().join("cases/settling"), &s.case());
+    copy_case("settling", &s.case(), "liggghts");
     edit(&s.case().join("fluid/system/blockMeshDict"), "type wall;", "type wedge;");
     fails(&s, &[], 2, &["no path with a blank", "patch = wedge"]);
 }
 
 #[test]
 fn who_died_is_quoted_and_stack_traces_are_not() {
-    let s = short_case("trace");
+    let s = short_case("trace", "liggghts");
     edit(&s.case().join("fluid/system/fvSolution"), "(p|pFinal|pcorr)", "(p|pFinal)");
     fails(&s, &[], 1, &["CFD rank 0", "Entry 'pcorr' not found", "cfd.log"]);
 }
 
 #[test]
 fn a_sphere_that_has_just_crossed_a_periodic_boundary_is_in_the_mesh() {
-    let s = short_case("periodic");
+    let s = short_case("periodic", "liggghts");
     // LIGGGHTS brings it back when it has gone half the skin, 1 mm; the mesh has walls there
     edit(&s.case().join("particles.in"), "boundary        f f f", "boundary        p f f");
     edit(&s.case().join("particles.in"), "single 0.0512", "single 0.0999");

@@ -360,12 +360,6 @@ fn warnings() {
         (SETTLING, &[], &["dem.force=constant"], &["errs by K Δt/(2 m)"]),
         (
             SETTLING,
-            &[("lammps.in", "run             1000000000", "run 1000000000 every 100 NULL")],
-            &LAMMPS,
-            &["dem.script = run ... every", "go on without the fluid", "leave `every` out"],
-        ),
-        (
-            SETTLING,
             &[("particles.in", "0 0.1 0 0.1 0 0.1", "0 0.1 0 0.1 0 0.2")],
             &[],
             &["DEM box in z = [0, 0.2]", "limits.outside = \"exclude\""],

@@ -458,11 +458,6 @@ fn dem(c: &Config, s: &script::Script, p: &mut Vec<Problem>) {
         let accepted = "the script has no `run`";
         p.push(Problem::error("dem.script", c.file.dem.script.display(), accepted, "add: run 1000000000"));
     }
-    if s.runs_in_parts {
-        let accepted = "the fluid's end ends one part of it: the next ones go on without the fluid";
-        let fix = "leave `every` out: thermo, dump and fix print act during a run";
-        p.push(Problem::warning("dem.script", "run ... every", accepted, fix));
-    }
     if let Some(r) = s.radius {
         if !(1e-8..=1.0).contains(&r) {
             p.push(Problem::error(

@@ -26,8 +26,6 @@ pub struct Script {
     pub commands: BTreeSet<String>,
     pub has_fix: bool,
     pub has_run: bool,
-    /// a `run … every …`
-    pub runs_in_parts: bool,
     /// takes particles from a restart file
     pub has_restart: bool,
     pub radius: Option<f64>,
@@ -116,10 +114,7 @@ pub fn read(path: &Path, given: &BTreeMap<String, String>) -> Result<Script, Str
                 s.radius = constant("radius").into_iter().chain(s.radius).max_by(f64::total_cmp);
                 s.density = constant("density").or(s.density);
             }
-            Some("run" | "rerun") => {
-                s.has_run = true;
-                s.runs_in_parts |= w.contains(&"every");
-            }
+            Some("run" | "rerun") => s.has_run = true,
             Some("set") if line.contains("density") || line.contains("diameter") => {
                 let after = |key: &str| w.iter().position(|x| *x == key).and_then(|i| n(i + 1));
                 s.density = after("density").or(s.density);
