@@ -26,7 +26,7 @@ using namespace LAMMPS_NS;
 using namespace FixConst;
 
 FixVoidage::FixVoidage(LAMMPS *lmp, int narg, char **arg)
-  : Fix(lmp, narg, arg), link_(NULL), a_(NULL), width_(COLUMNS), memory_(0), rows_(0), first_step_(-1), exchange_(0),
+  : Fix(lmp, narg, arg), link_(NULL), a_(NULL), width_(COLUMNS), memory_(0), rows_(0), first_step_(-1), step_(0), exchange_(0),
     restored_(-1), last_(false), interval_(1), explicit_limit_(0.2), added_(0.0), history_(false), types_(false),
     spins_(false), added_sent_(false), rotation_(false), constant_force_(false), ended_(false), quit_(false), runs_after_(0), integrated_(0), frozen_(0)
 {
@@ -61,7 +61,7 @@ FixVoidage::~FixVoidage()
   if (link_) {
     char text[200];
     snprintf(text, sizeof text, "the script ended or removed the fix at step " BIGINT_FORMAT ", before the fluid's endTime; "
-             "make its last run longer, type: run 1000000000", update->ntimestep);
+             "make its last run longer, type: run 1000000000", step_);
     voidage_fail(link_, text);
   }
   voidage_close(link_);
@@ -198,6 +198,7 @@ void FixVoidage::post_force(int vflag)
 
 void FixVoidage::end_of_step()
 {
+  step_ = update->ntimestep;
   if (ended_ || (update->ntimestep - first_step_) % interval_ != 0 || update->ntimestep == first_step_) return;
   exchange_++;
   exchange();

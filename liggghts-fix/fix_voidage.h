@@ -53,6 +53,7 @@ class FixVoidage : public Fix {
   int width_, memory_;         // columns of the table; those at its end the coupler wants to have back
   int rows_;                   // rows of the table
   bigint first_step_;          // DEM step of exchange 0, -1: not yet
+  bigint step_;                // last one done: when the program ends, `update` goes before its fixes
   bigint exchange_;            // number of the last exchange
   bigint restored_;            // exchange a restart file brought back, -1: none
   std::string restart_file_;   // to be written in this exchange, else empty
