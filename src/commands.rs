@@ -235,9 +235,8 @@ fn exchange(
     println!("mesh: {} cells of {} ranks", mesh.len(), session.cfd_ranks);
     let (mapping, links) = (map::resolve(&config.file.map.method, &mesh), setup::links(config, &mesh));
     println!("mapping: {} ({mapping})", config.file.map.method);
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let made = usize::from(mapping == "max-entropy") + usize::from(links == "voronoi");
-    let expected = PER_CELL * (made * mesh.len() / cores) as f64;
+    let expected = PER_CELL * (made * mesh.len() / threads::cores()) as f64;
     if expected > 0.5 * session.wait {
         println!(
             "@warning preparing takes about {expected:.0} s on these cores, during which the partners wait: limits.wait = {:.0}",

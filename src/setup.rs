@@ -85,8 +85,8 @@ pub fn pool(c: &Config) -> Result<Option<rayon::ThreadPool>, String> {
 
 /// The mapping by name, ready for the mesh.
 pub fn mapping(c: &Config, mesh: &Mesh) -> Result<Box<dyn Mapping>, String> {
-    let name = map::resolve(&c.file.map.method, mesh);
-    let found = map::all().into_iter().find(|m| m.name() == name);
+    let name = &c.file.map.method;
+    let found = map::by_name(name, mesh);
     let mut mapping = found.ok_or_else(|| format!("map.method = \"{name}\" is not known"))?;
     mapping.prepare(mesh, &map::Options { bandwidth: c.file.smooth.bandwidth, grid: c.file.map.grid });
     Ok(mapping)
@@ -99,13 +99,14 @@ pub fn classes(c: &Config, mesh: &Mesh) -> Classes {
 
 /// The mesh with the links that smoothing goes along.
 pub fn linked<'a>(c: &Config, mesh: &'a Mesh) -> Cow<'a, Mesh> {
-    let voronoi = links(c, mesh) == "voronoi" && smooths(c);
-    if voronoi { Cow::Owned(mesh.with_voronoi_links()) } else { Cow::Borrowed(mesh) }
+    if links(c, mesh) == "voronoi" { Cow::Owned(mesh.with_voronoi_links()) } else { Cow::Borrowed(mesh) }
 }
 
-/// The links meant by `smooth.links`: `auto` is `voronoi` on tetrahedra, whose faces are oblique to the lines between centres.
+/// The links meant by `smooth.links`: `auto` is `voronoi` on tetrahedra, whose faces are oblique to the lines between centres. Those of the
+/// faces, which are there, if nothing is smoothed.
 pub fn links<'a>(c: &'a Config, mesh: &Mesh) -> &'a str {
     match c.file.smooth.links.as_str() {
+        _ if !smooths(c) => "faces",
         "auto" if mesh.tetrahedral() => "voronoi",
         "auto" => "faces",
         name => name,
@@ -146,8 +147,8 @@ pub fn smoothers(
 pub fn step(c: &Config, mesh: Mesh) -> Result<CouplingStep, String> {
     let mapping = mapping(c, &mesh)?;
     // the partners are silent meanwhile, whatever run.threads says
-    let all = std::thread::available_parallelism().map_or(1, usize::from);
-    let (linked, variance) = threads::within(threads::pool(all)?.as_ref(), || {
+    let all = threads::pool(threads::cores())?;
+    let (linked, variance) = threads::within(all.as_ref(), || {
         let linked = linked(c, &mesh);
         let variance = if smooths(c) { map::taken_out(&*mapping, &mesh, &linked) } else { None };
         (linked, variance)

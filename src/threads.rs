@@ -15,6 +15,11 @@ pub fn count() -> usize {
     if rayon::current_thread_index().is_some() { rayon::current_num_threads() } else { 1 }
 }
 
+/// Cores this process may use.
+pub fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
 /// That many threads; none if one is enough.
 pub fn pool(count: usize) -> Result<Option<rayon::ThreadPool>, String> {
     let pool = || rayon::ThreadPoolBuilder::new().num_threads(count).build();

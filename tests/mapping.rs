@@ -522,8 +522,7 @@ fn solid_fraction(
     let mut position = position.to_vec();
     let mut host = vec![NONE; position.len()];
     Locator::new(mesh).locate(mesh, &mut position, &mut host).unwrap();
-    let mapping = map::resolve(mapping, mesh);
-    let mut m = map::all().into_iter().find(|m| m.name() == mapping).unwrap();
+    let mut m = map::by_name(mapping, mesh).unwrap();
     m.prepare(mesh, &Options { bandwidth: b, grid: 1.0 });
     let mut w = Weights::default();
     m.weights(mesh, &position, &vec![0.1; host.len()], &host, &mut w);

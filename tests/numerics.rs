@@ -593,7 +593,7 @@ fn bits_on(threads: usize, backwards: bool, mapping: &str) -> Bits {
     use voidage::bench::{scene, step::setup};
     let mesh = scene::mesh(scene::BOX, 12_000);
     let air = scene::air(&mesh);
-    let mut map = voidage::map::all().into_iter().find(|m| m.name() == mapping).unwrap();
+    let mut map = voidage::map::by_name(mapping, &mesh).unwrap();
     map.prepare(&mesh, &voidage::map::Options::default());
     let [g, positive] = ["chebyshev", "uniformization"].map(|name| smoother(name, &mesh, 5e-3, 1e-3));
     let mut step = CouplingStep::new(mesh, setup("syamlal-obrien").unwrap(), map, g, positive);

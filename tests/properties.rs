@@ -127,7 +127,7 @@ fn exchange(mesh: &Mesh, p: &Particles, seed: u64) -> Result<(), TestCaseError> 
     let mapping = map::all()[one_of(map::all().len(), &mut s)].name();
     let smoother = &smooth::NAMES[one_of(smooth::NAMES.len(), &mut s)];
     for scheme in scheme::all() {
-        let mut mapping = map::all().into_iter().find(|m| m.name() == mapping).unwrap();
+        let mut mapping = map::by_name(mapping, mesh).unwrap();
         mapping.prepare(mesh, &OPTIONS);
         let t = Diffusion::uniform(BANDWIDTH).links(mesh);
         let make = |name| smooth::by_name(name, mesh, &t, 1e-3).unwrap();

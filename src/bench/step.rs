@@ -102,10 +102,10 @@ pub fn setup(drag: &str) -> Result<Setup, String> {
 pub fn run(case: &Case) -> Result<Cost, String> {
     let mesh = scene::mesh(scene::BOX, case.cells);
     let fluid = scene::air(&mesh);
-    let name = map::resolve(case.mapping, &mesh);
-    let mapping = map::all().into_iter().find(|m| m.name() == name);
+    let mapping = map::by_name(case.mapping, &mesh);
     let mut mapping = mapping.ok_or_else(|| format!("mapping {} is not known", case.mapping))?;
     mapping.prepare(&mesh, &map::Options { bandwidth: case.bandwidth, grid: 2.4 * case.diameter });
+    let name = mapping.name();
     let t = smooth::Diffusion::uniform(case.bandwidth).links(&mesh);
     let graph = std::sync::Arc::new(smooth::Graph::new(&mesh, &t));
     let smoother = |name| smooth::on(name, &mesh, &t, &graph, case.tolerance).ok_or("no smoother");

@@ -51,6 +51,22 @@ pub fn entry(text: &str, key: &str) -> Option<String> {
     })
 }
 
+/// What stands in the braces of `name { … }`, up to the first brace in there; of a text without comments.
+fn section<'a>(text: &'a str, name: &str) -> Option<&'a str> {
+    text.split(name).nth(1)?.split(['{', '}']).nth(1)
+}
+
+/// Is a switch on?
+fn on(value: &str) -> bool {
+    ["yes", "on", "true"].contains(&value)
+}
+
+/// Time folders of a case, or of a processor's part of it.
+fn times(place: &Path) -> impl Iterator<Item = (f64, PathBuf)> {
+    let entries = std::fs::read_dir(place).ok().into_iter().flatten().flatten();
+    entries.filter_map(|e| Some((e.file_name().to_str()?.parse().ok()?, e.path())))
+}
+
 fn number(text: &str, key: &str) -> Option<f64> {
     entry(text, key)?.split_whitespace().last()?.parse().ok()
 }
@@ -67,7 +83,7 @@ impl Control {
         let need = |key: &str| number(&text, key).ok_or(none(key));
         let case = path.ancestors().nth(2).unwrap_or(path);
         let start = begin(&text, case).ok_or(none("startTime"))?;
-        let adjustable = entry(&text, "adjustTimeStep").is_some_and(|v| ["yes", "on", "true"].contains(&&*v));
+        let adjustable = entry(&text, "adjustTimeStep").is_some_and(|v| on(&v));
         Ok(Self { start, end: need("endTime")?, step: need("deltaT")?, adjustable })
     }
 }
@@ -108,8 +124,7 @@ pub fn has_patch(case: &Path, kind: &str) -> bool {
 /// Does system/fvSchemes leave out the rates of change?
 pub fn steady(case: &Path) -> bool {
     let text = plain(&std::fs::read_to_string(case.join("system/fvSchemes")).unwrap_or_default());
-    let section = text.split("ddtSchemes").nth(1).and_then(|s| s.split(['{', '}']).nth(1));
-    section.is_some_and(|s| s.contains("steadyState"))
+    section(&text, "ddtSchemes").is_some_and(|s| s.contains("steadyState"))
 }
 
 /// Has constant/MRFProperties a zone that is active (the default)?
@@ -117,9 +132,7 @@ pub fn rotating(case: &Path) -> bool {
     let Ok(text) = std::fs::read_to_string(case.join("constant/MRFProperties")) else { return false };
     let text = plain(&text);
     let zones = text.split("cellZone").skip(1);
-    zones
-        .map(|z| entry(z.split('}').next().unwrap_or(z), "active"))
-        .any(|a| a.is_none_or(|a| ["yes", "on", "true"].contains(&&*a)))
+    zones.map(|z| entry(z.split('}').next().unwrap_or(z), "active")).any(|a| a.is_none_or(|a| on(&a)))
 }
 
 /// The kind of mesh of constant/dynamicMeshDict, if it moves.
@@ -130,9 +143,7 @@ pub fn moving_mesh(case: &Path) -> Option<String> {
 
 /// The folder of a time in an OpenFOAM case.
 pub fn time_folder(case: &Path, time: f64, slack: f64) -> Option<PathBuf> {
-    let entries = std::fs::read_dir(case).ok()?.flatten();
-    let at = |e: &std::fs::DirEntry| e.file_name().to_str().and_then(|n| n.parse::<f64>().ok());
-    entries.into_iter().find(|e| at(e).is_some_and(|t| (t - time).abs() <= slack)).map(|e| e.path())
+    times(case).find(|(t, _)| (t - time).abs() <= slack).map(|found| found.1)
 }
 
 /// Time (s) a solver begins at by the text of its controlDict, with the time folders in `place`: the case or a processor's part of it.
@@ -141,8 +152,7 @@ pub fn begin(control: &str, place: &Path) -> Option<f64> {
     if from.as_deref() == Some("startTime") {
         return number(control, "startTime");
     }
-    let names = std::fs::read_dir(place).ok().into_iter().flatten().flatten();
-    let times = names.filter_map(|e| e.file_name().to_str()?.parse::<f64>().ok());
+    let times = times(place).map(|t| t.0);
     let first = from.as_deref() == Some("firstTime");
     let found = if first { times.min_by(f64::total_cmp) } else { times.max_by(f64::total_cmp) };
     Some(found.unwrap_or(0.0))
@@ -190,8 +200,8 @@ fn noted(case: &Path, what: &str) -> Option<usize> {
 /// The scheme of system/fvSchemes for the gradient of a field: its own, else the default.
 pub fn gradient(case: &Path, field: &str) -> Option<String> {
     let text = plain(&std::fs::read_to_string(case.join("system/fvSchemes")).ok()?);
-    let section = text.split("gradSchemes").nth(1)?.split(['{', '}']).nth(1)?;
-    entry(section, &format!("grad({field})")).or_else(|| entry(section, "default"))
+    let all = section(&text, "gradSchemes")?;
+    entry(all, &format!("grad({field})")).or_else(|| entry(all, "default"))
 }
 
 /// "(x y z)" groups of numbers in a text.

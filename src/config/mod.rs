@@ -3,17 +3,19 @@
 //!
 //! `foam` and `script` read the few facts needed from OpenFOAM dictionaries and scripts of the particle
 //! programs in `program`. All problems are reported at once, each with where, what was given, what is accepted and what to type.
-//! `bandwidth` and `resolution` put numbers to what is too coarse.
+//! `folders` looks at the OpenFOAM case; `bandwidth` and `resolution` put numbers to what is too coarse.
 
 mod bandwidth;
 mod check;
 pub mod foam;
+mod folders;
 pub mod program;
 mod raw;
 pub(crate) mod resolution;
 pub mod script;
 
-pub use check::{beginning, check, settings, unfit};
+pub use check::{check, settings};
+pub use folders::{beginning, unfit};
 pub use raw::*;
 use raw::{Parsed, parse};
 

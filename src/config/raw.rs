@@ -703,13 +703,15 @@ fn parsed(value: &str) -> Option<toml::Value> {
     toml::from_str::<toml::Table>(&format!("x = {value}")).ok()?.remove("x")
 }
 
-fn put(table: &mut toml::Table, key: &str, value: toml::Value) {
-    let (section, name) = key.split_once('.').unwrap_or(("", key));
-    if section.is_empty() {
-        table.insert(name.into(), value);
-    } else if let toml::Value::Table(t) = table.entry(section).or_insert_with(|| toml::Table::new().into()) {
-        t.insert(name.into(), value);
+/// None: the key leads through what is no table.
+fn put(table: &mut toml::Table, key: &str, value: toml::Value) -> Option<()> {
+    let (path, last) = key.rsplit_once('.').map_or((None, key), |(path, last)| (Some(path), last));
+    let mut at = table;
+    for part in path.into_iter().flat_map(|p| p.split('.')) {
+        at = at.entry(part).or_insert_with(|| toml::Table::new().into()).as_table_mut()?;
     }
+    at.insert(last.into(), value);
+    Some(())
 }
 
 fn look_up<'a>(table: &'a toml::Table, key: &str) -> Option<&'a toml::Value> {
@@ -722,7 +724,9 @@ fn look_up<'a>(table: &'a toml::Table, key: &str) -> Option<&'a toml::Value> {
 /// Why a table is no case file, key by key: each is tried alone in the smallest one.
 fn missing_or_of_another_type(table: &toml::Table) -> Vec<Problem> {
     let mut smallest = toml::Table::new();
-    NEEDED.iter().filter_map(|(k, v)| Some((k, parsed(v)?))).for_each(|(k, v)| put(&mut smallest, k, v));
+    for (key, value) in NEEDED {
+        let _ = parsed(value).and_then(|v| put(&mut smallest, key, v));
+    }
     let method = table.get("smooth").and_then(|s| s.get("method")?.as_str());
     let mut problems = Vec::new();
     for (key, unit, default, meaning) in KEYS {
@@ -744,7 +748,7 @@ fn missing_or_of_another_type(table: &toml::Table) -> Vec<Problem> {
             continue;
         };
         let mut alone = smallest.clone();
-        put(&mut alone, key, value.clone());
+        let _ = put(&mut alone, key, value.clone());
         if let Err(e) = CaseFile::deserialize(alone) {
             let said = e
                 .message()
@@ -785,16 +789,9 @@ fn bandwidth_word(table: &mut toml::Table) -> Result<bool, Vec<Problem>> {
 
 fn set(table: &mut toml::Table, key: &str, value: &str) -> Result<(), Vec<Problem>> {
     let value = parsed(value).unwrap_or_else(|| toml::Value::String(value.into()));
-    let bad =
-        || vec![Problem::error(key, &value, "overrides are section.key=value", "see `voidage explain`")];
-    let (path, last) = key.rsplit_once('.').ok_or_else(bad)?;
-    let mut at = table;
-    for part in path.split('.') {
-        let next = at.entry(part).or_insert_with(|| toml::Value::Table(toml::Table::new()));
-        at = next.as_table_mut().ok_or_else(bad)?;
-    }
-    at.insert(last.into(), value);
-    Ok(())
+    let bad = Problem::error(key, &value, "overrides are section.key=value", "see `voidage explain`");
+    let done = key.contains('.').then(|| put(table, key, value)).flatten();
+    done.ok_or_else(|| vec![bad])
 }
 
 /// Keys of a section; a value outside sections is its own key.

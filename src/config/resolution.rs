@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Are steps and bandwidth fine enough? Time steps against the time scales of Radl et al. (2014) eqs. 9 to 11, and
-//! the bias of the gathered fluid velocity as a number; the pressure gradient on tetrahedra. Called by `check`; reads what case and script say.
+//! the bias of the gathered fluid velocity as a number. Called by `check`; reads what case and script say.
 
 use super::{Config, InInterval, Problem, foam, script};
 use crate::forces::history::explicit_ratio;
@@ -84,22 +84,6 @@ pub fn gather_bias(c: &Config, mesh: &foam::Extent, s: &script::Script, p: &mut 
         let fix =
             format!("interpolate.fluid_velocity = \"linear\", or smooth.bandwidth = {:.1e}", 0.15 * gap);
         p.push(Problem::warning("smooth.bandwidth", b, &accepted, fix));
-    }
-}
-
-/// Gauss' gradient takes p at the middle between two centres for p at the middle of their face, which on tetrahedra lie a third of a cell apart: a linear
-/// pressure gets a gradient that is wrong by half (`cases/ergun/tetrahedra`).
-pub fn pressure_gradient(c: &Config, p: &mut Vec<Problem>) {
-    let case = c.fluid_case();
-    let tetrahedra = foam::faces_per_cell(&case).is_some_and(|f| f < 4.75);
-    let given = foam::gradient(&case, "p").filter(|g| tetrahedra && g.starts_with("Gauss"));
-    if let Some(given) = given {
-        p.push(Problem::warning(
-            "system/fvSchemes: grad(p)",
-            given,
-            "on tetrahedra a pressure drop comes out 14 to 15 % too low with it, while all books balance",
-            "gradSchemes { default Gauss linear; grad(p) leastSquares; } and, in fvSolution, nNonOrthogonalCorrectors 2",
-        ));
     }
 }
 

@@ -55,6 +55,13 @@ pub struct Around {
     pub cell_volume: f64,
 }
 
+impl Around {
+    /// All particles have this diameter (m); the cell's volume is not known: 0.
+    fn alike(diameter: f64) -> Self {
+        Self { sauter_diameter: diameter, mean_diameter: diameter, cell_volume: 0.0 }
+    }
+}
+
 /// A drag law.
 pub trait DragLaw: Sync {
     /// Name in case.toml.

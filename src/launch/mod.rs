@@ -37,9 +37,7 @@ pub struct Companions {
     pub voidage: PathBuf,
     /// the solver
     pub solver: PathBuf,
-    /// function object and fvOption for stock solvers
-    pub stock: PathBuf,
-    /// where the fixes of the particle programs are
+    /// where the fixes of the particle programs, and function object and fvOption for stock solvers are
     pub libraries: PathBuf,
 }
 
@@ -62,12 +60,7 @@ pub fn companions() -> Result<Companions, String> {
     let home = found.ok_or(
         "libvoidageLiggghts.so was not found beside this program: type ./setup build, or set VOIDAGE_HOME to the prefix",
     )?;
-    Ok(Companions {
-        voidage: exe,
-        solver: home.join("bin/voidageFoam"),
-        stock: home.join("lib/libvoidageFoam.so"),
-        libraries: home.join("lib"),
-    })
+    Ok(Companions { voidage: exe, solver: home.join("bin/voidageFoam"), libraries: home.join("lib") })
 }
 
 /// Refuses a particle program that is not there: mpirun's words for it are long and name no remedy.
@@ -185,7 +178,7 @@ fn start(
     dem.extend(["-var".into(), "voidage_restart_file".into(), file]);
     let stock = f.fluid.stock();
     // a stock solver selects its fvOptions before it loads the libraries of its function objects
-    let library = format!("LD_PRELOAD={}", home.stock.display());
+    let library = format!("LD_PRELOAD={}", home.libraries.join("libvoidageFoam.so").display());
     let export: &[&str] = if stock { &[&session, &foam, &library] } else { &[&session, &foam] };
     let mut cfd = mpirun(f.run.cfd_ranks, &shared, &own("mf")?, export);
     let solver = if stock { f.fluid.solver.clone() } else { text(&home.solver) };

@@ -19,7 +19,7 @@
 //! missed, and weights jump at the host's border.
 //! Cost on one thread with 8, 2 and 1 particles per cell: 1.5, 1.7, 1.8 us on tetrahedra, 1.0, 1.1, 1.2 on hexahedra, 1.2, 1.3, 1.5 on
 //! polyhedra. A host's first particle costs the walk over the cells around, 10 to 25 us; what it finds is kept (`ring`), as the mesh does
-//! not change: 80 bytes per cell, and for each that ever was a host some 850 on tetrahedra, 480 on hexahedra, 590 on polyhedra, and 24 more per image near walls and cyclics.
+//! not change: 16 bytes per cell, and for each that ever was a host some 850 on tetrahedra, 480 on hexahedra, 590 on polyhedra, and 24 more per image near walls and cyclics.
 //! The weights themselves take 680 bytes per particle. `bell` solves for them.
 //! Reads positions (m), cells; writes weights. Does not know radii.
 

@@ -108,6 +108,12 @@ pub fn resolve<'a>(name: &'a str, mesh: &Mesh) -> &'a str {
     }
 }
 
+/// The mapping meant by a name, not yet prepared.
+pub fn by_name(name: &str, mesh: &Mesh) -> Option<Box<dyn Mapping>> {
+    let name = resolve(name, mesh);
+    all().into_iter().find(|m| m.name() == name)
+}
+
 /// What is taken out of T on each link for the variance that the deposit has itself, m2: of its two cells the mean. `mesh`: the one
 /// the mapping was prepared for; `linked`: the same cells with the links of the smoother. None: nothing.
 pub fn taken_out(mapping: &dyn Mapping, mesh: &Mesh, linked: &Mesh) -> Option<Vec<f64>> {

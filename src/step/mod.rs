@@ -407,18 +407,24 @@ impl CouplingStep {
         Ok(())
     }
 
+    /// What particle i brings, deposited and smoothed beside `work`, by row.
+    fn spread_beside(&mut self, brings: impl Fn(usize) -> Lanes + Sync) -> Vec<Lanes> {
+        let mut lanes = vec![[0.0; 8]; self.classes.rows()];
+        let mesh = self.wide.as_ref().unwrap_or(&self.mesh);
+        self.weights.deposit(mesh, &self.order, &mut lanes, |i, _: &mut ()| brings(i));
+        self.smoothers[self.smoother].apply(&mut lanes, &self.active, Direction::Spread, &mut self.scratch);
+        lanes
+    }
+
     /// Forms ε_s U_s for output where no stage needs it.
     pub fn form_solids_flux(&mut self, p: &Particles) {
         if self.setup.solids_flux {
             return;
         }
-        let mut lanes = vec![[0.0; 8]; self.classes.rows()];
-        let mesh = self.wide.as_ref().unwrap_or(&self.mesh);
-        self.weights.deposit(mesh, &self.order, &mut lanes, |i, _: &mut ()| {
+        let lanes = self.spread_beside(|i| {
             let (v, u) = (p.volume(i), p.velocity[i]);
             [v * u[0], v * u[1], v * u[2], 0.0, 0.0, 0.0, 0.0, 0.0]
         });
-        self.smoothers[self.smoother].apply(&mut lanes, &self.active, Direction::Spread, &mut self.scratch);
         self.sources.solids_flux.fill([0.0; 3]);
         for (row, l) in lanes.iter().enumerate() {
             let flux = &mut self.sources.solids_flux[self.classes.cell(row as u32)];

@@ -104,13 +104,11 @@ impl CouplingStep {
 
     /// Σ V d of the primary particles, smoothed, for the particles to read in lane 1: the flux there has been taken by now.
     fn mean_diameters(&mut self, p: &Particles) {
-        let mut lanes = vec![[0.0; 8]; self.classes.rows()];
-        let (mesh, extra) = (self.wide.as_ref().unwrap_or(&self.mesh), &self.setup.extra);
-        self.weights.deposit(mesh, &self.order, &mut lanes, |i, _: &mut ()| {
+        let extra = self.setup.extra.clone();
+        let lanes = self.spread_beside(|i| {
             let (v, d) = (p.volume(i), 2.0 * p.radius[i] / extra.ratio(&p.asked.kind, i));
             [v, v * d, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
         });
-        self.smoothers[self.smoother].apply(&mut lanes, &self.active, Direction::Spread, &mut self.scratch);
         let mut cells = vec![[0.0; 2]; self.mesh.len()];
         for row in &self.active.rows {
             let (to, l) = (&mut cells[self.classes.cell(*row)], &lanes[*row as usize]);

@@ -55,8 +55,7 @@ impl DragLaw for Cello {
     }
     /// All particles alike: y = 1.
     fn drag_coefficient(&self, s: &Slip) -> f64 {
-        let (sauter_diameter, mean_diameter) = (s.diameter, s.diameter);
-        self.drag_coefficient_in(s, &Around { sauter_diameter, mean_diameter, cell_volume: 0.0 })
+        self.drag_coefficient_in(s, &Around::alike(s.diameter))
     }
     fn drag_coefficient_in(&self, s: &Slip, a: &Around) -> f64 {
         let (e, y) = (s.voidage, s.diameter / a.sauter_diameter);

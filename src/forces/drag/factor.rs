@@ -61,10 +61,7 @@ impl DragLaw for BeetstraPoly {
     }
     /// All particles alike: y = 1 (the correction is 1.064 then, as published).
     fn drag_coefficient(&self, s: &Slip) -> f64 {
-        self.drag_coefficient_in(
-            s,
-            &Around { sauter_diameter: s.diameter, mean_diameter: 0.0, cell_volume: 0.0 },
-        )
+        self.drag_coefficient_in(s, &Around::alike(s.diameter))
     }
     fn drag_coefficient_in(&self, s: &Slip, a: &Around) -> f64 {
         let y = s.diameter / a.sauter_diameter;
